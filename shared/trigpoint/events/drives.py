@@ -1,0 +1,169 @@
+"""One drive's observations as arrays: what the estimating cores work on, folded from its events."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trigpoint.events.envelope import Envelope
+from trigpoint.events.observed import (
+    GnssFixReceived,
+    ImuMeasured,
+    LandmarksDetected,
+    Observed,
+    VehicleDescribed,
+    WheelPairMeasured,
+    WheelSpeedMeasured,
+)
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WheelSeries:
+    """Speeds (n,) in m/s of the base or of the wheel at `speed_wheel_y_m`; steering and yaw rate NaN where
+    not measured. A wheel pair becomes mean speed and (right - left) / track."""
+
+    stamp_ns: Ints
+    speed_mps: Floats
+    steering_rad: Floats
+    yaw_rate_radps: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImuSeries:
+    """Yaw rates (n,) in rad/s."""
+
+    stamp_ns: Ints
+    yaw_rate_radps: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FixSeries:
+    """GNSS fixes (n,), degrees; sigma NaN where not declared; `sequence` names the event in its boot."""
+
+    stamp_ns: Ints
+    lat_deg: Floats
+    lon_deg: Floats
+    sigma_m: Floats
+    sequence: Ints
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DetectionSeries:
+    """Landmark detections (n,), one row each, in order of time; `sequence` names the sweep's event.
+
+    Bearing counter-clockwise from ahead in the sensor's frame; kind and signature as in LandmarkDetection.
+    """
+
+    stamp_ns: Ints
+    range_m: Floats
+    bearing_rad: Floats
+    diameter_m: Floats
+    kind: tuple[str, ...]
+    signature: tuple[str, ...]
+    sequence: Ints
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drive:
+    """Everything one vehicle measured in one boot. Each series is sorted by time, not by arrival."""
+
+    vehicle: str
+    boot_id: str
+    described: VehicleDescribed
+    wheels: WheelSeries
+    imu: ImuSeries
+    fixes: FixSeries
+    detections: DetectionSeries
+
+
+def _column(values: Iterable[float]) -> Floats:
+    return np.fromiter(values, dtype=np.float64)
+
+
+def _stamps(rows: Iterable[Envelope[object]]) -> Ints:
+    return np.fromiter((row.stamp_ns for row in rows), dtype=np.int64)
+
+
+def _wheel_series(
+    singles: list[Envelope[WheelSpeedMeasured]], pairs: list[Envelope[WheelPairMeasured]], track_m: float
+) -> WheelSeries:
+    left, right = _column(row.event.left_mps for row in pairs), _column(row.event.right_mps for row in pairs)
+    pair_yaw_rate = (right - left) / track_m if track_m > 0.0 else np.full(len(pairs), np.nan)
+    stamp_ns = np.concatenate([_stamps(singles), _stamps(pairs)])
+    order = np.argsort(stamp_ns, kind="stable")
+    speed = np.concatenate([_column(row.event.speed_mps for row in singles), 0.5 * (left + right)])
+    steering = np.concatenate([_column(row.event.steering_rad for row in singles), np.full(len(pairs), np.nan)])
+    yaw_rate = np.concatenate([_column(row.event.yaw_rate_radps for row in singles), pair_yaw_rate])
+    return WheelSeries(
+        stamp_ns=stamp_ns[order],
+        speed_mps=speed[order],
+        steering_rad=steering[order],
+        yaw_rate_radps=yaw_rate[order],
+    )
+
+
+def _imu_series(rows: list[Envelope[ImuMeasured]]) -> ImuSeries:
+    return ImuSeries(stamp_ns=_stamps(rows), yaw_rate_radps=_column(row.event.yaw_rate_radps for row in rows))
+
+
+def _fix_series(rows: list[Envelope[GnssFixReceived]]) -> FixSeries:
+    return FixSeries(
+        stamp_ns=_stamps(rows),
+        lat_deg=_column(row.event.lat_deg for row in rows),
+        lon_deg=_column(row.event.lon_deg for row in rows),
+        sigma_m=_column(row.event.sigma_m for row in rows),
+        sequence=np.fromiter((row.identity.sequence for row in rows), dtype=np.int64),
+    )
+
+
+def _detection_series(rows: list[Envelope[LandmarksDetected]]) -> DetectionSeries:
+    flat = [(row.stamp_ns, row.identity.sequence, seen) for row in rows for seen in row.event.detections]
+    return DetectionSeries(
+        stamp_ns=np.array([stamp_ns for stamp_ns, _, _ in flat], dtype=np.int64),
+        range_m=_column(seen.range_m for _, _, seen in flat),
+        bearing_rad=_column(seen.bearing_rad for _, _, seen in flat),
+        diameter_m=_column(seen.diameter_m for _, _, seen in flat),
+        kind=tuple(seen.kind for _, _, seen in flat),
+        signature=tuple(seen.signature for _, _, seen in flat),
+        sequence=np.array([sequence for _, sequence, _ in flat], dtype=np.int64),
+    )
+
+
+def drives_of(events: Iterable[Envelope[Observed]]) -> tuple[Drive, ...]:
+    """One Drive for each (vehicle, boot) in the events, in order of vehicle and first stamp.
+
+    Events may come in any order between kinds; a drive without VehicleDescribed gets an all-zero one.
+    """
+    by_drive: dict[tuple[str, str], dict[type, list[Envelope[Observed]]]] = {}
+    for row in events:
+        kinds = by_drive.setdefault((row.identity.source, row.identity.boot_id), {})
+        kinds.setdefault(type(row.event), []).append(row)
+    drives = [_drive(vehicle, boot_id, kinds) for (vehicle, boot_id), kinds in by_drive.items()]
+    return tuple(sorted(drives, key=lambda drive: (drive.vehicle, first_stamp_ns(drive), drive.boot_id)))
+
+
+def first_stamp_ns(drive: Drive) -> int:
+    """The earliest stamp of any series of a drive, 0 for an empty one."""
+    series = (drive.wheels.stamp_ns, drive.imu.stamp_ns, drive.fixes.stamp_ns, drive.detections.stamp_ns)
+    return min((int(stamps[0]) for stamps in series if len(stamps)), default=0)
+
+
+def _drive(vehicle: str, boot_id: str, kinds: dict[type, list[Envelope[Observed]]]) -> Drive:
+    def rows(kind: type) -> list:  # type: ignore[type-arg]
+        return sorted(kinds.get(kind, []), key=lambda row: row.stamp_ns)
+
+    described = rows(VehicleDescribed)
+    description = described[-1].event if described else VehicleDescribed(vehicle=vehicle)
+    return Drive(
+        vehicle=vehicle,
+        boot_id=boot_id,
+        described=description,
+        wheels=_wheel_series(rows(WheelSpeedMeasured), rows(WheelPairMeasured), description.track_m),
+        imu=_imu_series(rows(ImuMeasured)),
+        fixes=_fix_series(rows(GnssFixReceived)),
+        detections=_detection_series(rows(LandmarksDetected)),
+    )

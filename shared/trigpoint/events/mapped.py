@@ -1,0 +1,90 @@
+"""What the optimiser solved: one map version is one MapSolved and what follows it. Writer: optimisation."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MapSolved:
+    """A map version was solved from the log up to `inputs` (stream, count) with `settings_json`.
+
+    Appended last: a version without it is not there.
+    """
+
+    map_version: int
+    method: str
+    settings_json: str
+    inputs: tuple[tuple[str, int], ...]
+    landmark_count: int
+    anchor_count: int
+    wall_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrajectorySolved:
+    """One drive's path. stamp_ns (n,); pose (n, 3): x, y in m, heading in rad, base in map frame;
+    covariance (n, 3, 3). `calibration` (name, value, sigma) are the drive's calibration states, in the
+    unit the name ends with.
+    """
+
+    map_version: int
+    vehicle: str
+    boot_id: str
+    stamp_ns: Ints
+    pose: Floats
+    covariance: Floats
+    calibration: tuple[tuple[str, float, float], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LandmarkSolved:
+    """One landmark of a map version. position (2,): x, y in m, map frame; covariance (2, 2) in m^2.
+
+    `landmark` is stable between versions. `observations` are where its detections stand: (vehicle, boot_id,
+    sequence of the sweep). `anchors` are the labels tied to it.
+    """
+
+    map_version: int
+    landmark: str
+    kind: str
+    signature: str
+    position_m: Floats
+    covariance_m2: Floats
+    observation_count: int
+    vehicles: tuple[str, ...]
+    first_seen_ns: int
+    last_seen_ns: int
+    anchors: tuple[str, ...]
+    observations: tuple[tuple[str, str, int], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnchorAssociated:
+    """What became of one anchor: the landmark it was tied to (or "" and why not) and the residual left.
+
+    residual (2,): label minus landmark minus image offset, m.
+    """
+
+    map_version: int
+    anchor: str
+    landmark: str
+    reason: str
+    residual_m: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImageOffsetSolved:
+    """An aerial image's own offset. offset (2,): label minus true position, m; covariance (2, 2) in m^2."""
+
+    map_version: int
+    image: str
+    offset_m: Floats
+    covariance_m2: Floats
+
+
+Mapped = MapSolved | TrajectorySolved | LandmarkSolved | AnchorAssociated | ImageOffsetSolved

@@ -1,0 +1,132 @@
+"""Map frame and the changes between WGS84, grid and map positions; pyproj's one home."""
+
+import math
+import threading
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from pyproj import CRS, Proj, Transformer
+from pyproj.exceptions import CRSError, ProjError
+from pyproj.transformer import TransformerGroup
+
+from trigpoint.errors import FrameRefused
+from trigpoint.geodesy.positions import GridPosition, MapPosition, Wgs84Position
+
+Floats = NDArray[np.float64]
+
+WGS84 = "EPSG:4326"
+ORIGIN_ROUNDING_M = 1000.0  # a map's origin is a round grid position: a person can read it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MapFrame:
+    """A map's pinned frame: x east and y north along the grid of `crs`, in metres from the origin.
+
+    `point_scale` is grid metres for one metre on the ground at the origin, `convergence_rad` the
+    angle from true north to grid north, clockwise positive (Snyder 1987, ch. 8).
+    """
+
+    crs: str
+    origin_easting_m: float
+    origin_northing_m: float
+    point_scale: float
+    convergence_rad: float
+    operation: str
+    operation_accuracy_m: float
+
+
+def _parsed_crs(crs: str) -> CRS:
+    try:
+        return CRS.from_user_input(crs)
+    except CRSError as error:
+        raise FrameRefused(f"CRS {crs!r} is not known: {error}") from error
+
+
+@lru_cache(maxsize=64)
+def _transformer(source_crs: str, target_crs: str, thread_id: int) -> Transformer:
+    # One transformer a thread: PROJ contexts must not be shared. `thread_id` is only part of the cache key.
+    return Transformer.from_crs(_parsed_crs(source_crs), _parsed_crs(target_crs), always_xy=True)
+
+
+def transform_coordinates(x: Floats, y: Floats, *, source_crs: str, target_crs: str) -> tuple[Floats, Floats]:
+    """Coordinates (n,) in `target_crs`, always x or longitude first.
+
+    Raises FrameRefused for an unknown CRS or a position outside the projection's domain.
+    """
+    transformer = _transformer(source_crs, target_crs, threading.get_ident())
+    try:
+        out_x, out_y = transformer.transform(np.asarray(x, float), np.asarray(y, float), errcheck=True)
+    except ProjError as error:
+        raise FrameRefused(f"a position cannot be taken from {source_crs} into {target_crs}: {error}") from error
+    return np.asarray(out_x, dtype=np.float64), np.asarray(out_y, dtype=np.float64)
+
+
+def utm_crs(position: Wgs84Position) -> str:
+    """The EPSG name of the UTM zone a position lies in."""
+    zone = int(math.floor((position.lon_deg + 180.0) / 6.0)) % 60 + 1
+    return f"EPSG:{(32600 if position.lat_deg >= 0.0 else 32700) + zone}"
+
+
+def pin_map_frame(*, crs: str, origin: GridPosition) -> MapFrame:
+    """The map frame of a projected CRS and an origin. Raises FrameRefused if `crs` is not projected in metres."""
+    parsed = _parsed_crs(crs)
+    if not parsed.is_projected or any(abs(axis.unit_conversion_factor - 1.0) > 0.0 for axis in parsed.axis_info[:2]):
+        raise FrameRefused(f"CRS {crs!r} is {parsed.type_name}: a map needs a projected CRS in metres")
+    best = TransformerGroup(WGS84, parsed, always_xy=True).transformers[0]
+    lon_deg, lat_deg = transform_coordinates(
+        np.array([origin.easting_m]), np.array([origin.northing_m]), source_crs=crs, target_crs=WGS84
+    )
+    factors = Proj(parsed).get_factors(lon_deg[0], lat_deg[0])
+    return MapFrame(
+        crs=crs,
+        origin_easting_m=origin.easting_m,
+        origin_northing_m=origin.northing_m,
+        point_scale=math.sqrt(float(factors.meridional_scale) * float(factors.parallel_scale)),
+        convergence_rad=math.radians(float(factors.meridian_convergence)),
+        operation=best.description,
+        operation_accuracy_m=float(best.accuracy),
+    )
+
+
+def pin_map_frame_at(position: Wgs84Position) -> MapFrame:
+    """The map frame of the UTM zone around a first position, its origin rounded down to whole kilometres."""
+    crs = utm_crs(position)
+    easting_m, northing_m = transform_coordinates(
+        np.array([position.lon_deg]), np.array([position.lat_deg]), source_crs=WGS84, target_crs=crs
+    )
+    origin = GridPosition(
+        math.floor(easting_m[0] / ORIGIN_ROUNDING_M) * ORIGIN_ROUNDING_M,
+        math.floor(northing_m[0] / ORIGIN_ROUNDING_M) * ORIGIN_ROUNDING_M,
+    )
+    return pin_map_frame(crs=crs, origin=origin)
+
+
+def map_points_from_wgs84(lat_deg: Floats, lon_deg: Floats, frame: MapFrame) -> Floats:
+    """Map positions (n, 2): x, y in metres, of latitudes and longitudes (n,) in degrees."""
+    easting_m, northing_m = transform_coordinates(lon_deg, lat_deg, source_crs=WGS84, target_crs=frame.crs)
+    return np.column_stack([easting_m - frame.origin_easting_m, northing_m - frame.origin_northing_m])
+
+
+def wgs84_from_map_points(point_m: Floats, frame: MapFrame) -> tuple[Floats, Floats]:
+    """Latitudes and longitudes (n,) in degrees of map positions (n, 2): x, y in metres."""
+    lon_deg, lat_deg = transform_coordinates(
+        point_m[:, 0] + frame.origin_easting_m,
+        point_m[:, 1] + frame.origin_northing_m,
+        source_crs=frame.crs,
+        target_crs=WGS84,
+    )
+    return lat_deg, lon_deg
+
+
+def map_from_wgs84(position: Wgs84Position, frame: MapFrame) -> MapPosition:
+    """One position in the map frame."""
+    point_m = map_points_from_wgs84(np.array([position.lat_deg]), np.array([position.lon_deg]), frame)[0]
+    return MapPosition(float(point_m[0]), float(point_m[1]))
+
+
+def wgs84_from_map(position: MapPosition, frame: MapFrame) -> Wgs84Position:
+    """One position in degrees."""
+    lat_deg, lon_deg = wgs84_from_map_points(np.array([[position.x_m, position.y_m]]), frame)
+    return Wgs84Position(float(lat_deg[0]), float(lon_deg[0]))

@@ -1,0 +1,44 @@
+"""What a log can do, whatever keeps it."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from trigpoint.events.codec import Event
+from trigpoint.events.envelope import Envelope, LogPosition
+
+
+@dataclass(frozen=True, slots=True)
+class LoggedEvent:
+    """An event and where it stands in the log."""
+
+    position: LogPosition
+    envelope: Envelope[Event]
+
+
+class EventLog(Protocol):
+    """Append-only streams of events; one writer a stream."""
+
+    def append(self, stream: str, rows: Sequence[Envelope[Event]]) -> LogPosition:
+        """The position of the last row, once all rows are durable. Raises AppendFailed."""
+
+    def read(
+        self,
+        stream: str,
+        *,
+        first_number: int = 0,
+        from_ns: int | None = None,
+        until_ns: int | None = None,
+        kinds: Sequence[type] | None = None,
+    ) -> Iterator[LoggedEvent]:
+        """The events of a stream from `first_number` on, in order of appending; of the half-open time range
+        [from_ns, until_ns) and of the given event classes only, if given: files and chunks outside stay closed."""
+
+    def streams(self) -> tuple[str, ...]:
+        """The names of all streams, sorted."""
+
+    def next_number(self, stream: str) -> int:
+        """The number the next appended event will get; 0 for an unknown stream."""
+
+    def close(self) -> None:
+        """Everything flushed, files closed with their index."""
