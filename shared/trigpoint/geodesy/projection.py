@@ -1,7 +1,6 @@
 """Map frame and the changes between WGS84, grid and map positions; pyproj's one home."""
 
 import math
-import threading
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -45,8 +44,8 @@ def _parsed_crs(crs: str) -> CRS:
 
 
 @lru_cache(maxsize=64)
-def _transformer(source_crs: str, target_crs: str, thread_id: int) -> Transformer:
-    # One transformer a thread: PROJ contexts must not be shared. `thread_id` is only part of the cache key.
+def _transformer(source_crs: str, target_crs: str) -> Transformer:
+    # PROJ contexts must not be shared between threads: pyproj's Transformer (since 3.1) keeps one a thread itself.
     return Transformer.from_crs(_parsed_crs(source_crs), _parsed_crs(target_crs), always_xy=True)
 
 
@@ -55,7 +54,7 @@ def transform_coordinates(x: Floats, y: Floats, *, source_crs: str, target_crs: 
 
     Raises FrameRefused for an unknown CRS or a position outside the projection's domain.
     """
-    transformer = _transformer(source_crs, target_crs, threading.get_ident())
+    transformer = _transformer(source_crs, target_crs)
     try:
         out_x, out_y = transformer.transform(np.asarray(x, float), np.asarray(y, float), errcheck=True)
     except ProjError as error:
