@@ -91,9 +91,7 @@ class LandmarksDetected:
     detections: tuple[LandmarkDetection, ...]
 
 
-Observed = (
-    VehicleDescribed | WheelSpeedMeasured | WheelPairMeasured | ImuMeasured | GnssFixReceived | LandmarksDetected
-)
+Observed = VehicleDescribed | WheelSpeedMeasured | WheelPairMeasured | ImuMeasured | GnssFixReceived | LandmarksDetected
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -45,7 +45,7 @@ class Pose2:
 
 
 def transform_points(T_a_b: Floats, point_b_m: Floats) -> Floats:
-    """Points in frame a, (n, 2) metres, from poses (n, 3) or (3,): x, y in m, heading in rad, and points (n, 2) in b."""
+    """Points in frame a, (n, 2) metres, from poses (n, 3) or (3,): x, y in m, heading in rad; points (n, 2) in b."""
     c, s = np.cos(T_a_b[..., 2]), np.sin(T_a_b[..., 2])
     x_m, y_m = point_b_m[..., 0], point_b_m[..., 1]
     return np.stack([T_a_b[..., 0] + c * x_m - s * y_m, T_a_b[..., 1] + s * x_m + c * y_m], axis=-1)
