@@ -6,23 +6,33 @@ from typing import Protocol, Self
 
 from trigpoint.events.envelope import EventIdentity
 
+UNIDENTIFIED = EventIdentity("", "", -1)
+"""Identity of a message that came without a readable attachment: its sender does not speak trigpoint."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BusMessage:
-    """One message: `key` as in dataflow, payload in the Protobuf schema `schema_name`, identity and time of measurement."""
+    """One message: `key` as in dataflow, payload in the Protobuf schema `schema_name` of the writer's
+    `schema_version`, identity and time of measurement.
+    """
 
     key: str
     schema_name: str
     payload: bytes
     identity: EventIdentity
     stamp_ns: int
+    schema_version: int = 1
 
 
 class Subscription(Protocol):
     """Messages that arrived for one key expression, in order of arrival."""
 
+    @property
+    def lost(self) -> int:
+        """How many messages arrived and were dropped because the queue was full; never reset."""
+
     def receive(self, timeout_s: float) -> BusMessage | None:
-        """The next message, or None if none came within `timeout_s`."""
+        """The next message, or None if none came within `timeout_s` or the subscription is closed."""
 
     def close(self) -> None:
         """No more messages; ones not yet received are dropped."""
@@ -32,13 +42,22 @@ class Bus(Protocol):
     """Publishes and subscribes; a context manager, so that it is always closed."""
 
     def publish(self, message: BusMessage) -> None:
-        """The message handed to the transport; no promise that anyone got it."""
+        """The message handed to the transport; no promise that anyone got it.
+
+        Raises InputError for a key that may not be published, ServiceError on a closed bus.
+        """
 
     def subscribe(self, key_expression: str) -> Subscription:
-        """A subscription to all keys the expression matches (`*` one chunk, `**` any number)."""
+        """A subscription to all keys the expression matches (`*` one chunk, `**` any number).
+
+        Raises InputError for an expression that is not well formed, ServiceError on a closed bus.
+        """
+
+    def has_listener(self, key: str) -> bool:
+        """Whether a subscription that matches the key is known here now: what is published before is lost."""
 
     def close(self) -> None:
-        """The session ended."""
+        """The session and its subscriptions ended; again: no effect."""
 
     def __enter__(self) -> Self: ...
 

@@ -1,0 +1,111 @@
+"""A bus in memory: sessions of one exchange hear one another, in the same process."""
+
+import threading
+from types import TracebackType
+from typing import Self
+
+from trigpoint.bus.inbox import INBOX_CAPACITY, Inbox
+from trigpoint.bus.key_expressions import checked_expression, checked_key, key_matches
+from trigpoint.bus.ports import BusMessage
+from trigpoint.errors import ServiceError
+
+
+class MemorySubscription:
+    """Messages of one expression; made by MemoryBus.subscribe."""
+
+    def __init__(self, expression: str, exchange: "MemoryExchange", capacity: int) -> None:
+        self._expression = expression
+        self._exchange = exchange
+        self._inbox: Inbox[BusMessage] = Inbox(capacity)
+
+    @property
+    def lost(self) -> int:
+        """How many messages were dropped because the queue was full."""
+        return self._inbox.lost
+
+    def matches(self, key: str) -> bool:
+        """Whether messages on this key belong here."""
+        return key_matches(self._expression, key)
+
+    def offer(self, message: BusMessage) -> None:
+        """The message queued, or counted as lost."""
+        self._inbox.offer(message)
+
+    def receive(self, timeout_s: float) -> BusMessage | None:
+        """The next message, or None if none came within `timeout_s` or the subscription is closed."""
+        return self._inbox.take(timeout_s)
+
+    def close(self) -> None:
+        """No more messages; ones not yet received are dropped."""
+        self._exchange.leave(self)
+        self._inbox.close()
+
+
+class MemoryExchange:
+    """What the sessions of one bus share: who listens to what."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._subscriptions: tuple[MemorySubscription, ...] = ()
+
+    def join(self, subscription: MemorySubscription) -> None:
+        """From now on the subscription hears what matches it."""
+        with self._lock:
+            self._subscriptions = (*self._subscriptions, subscription)
+
+    def leave(self, subscription: MemorySubscription) -> None:
+        """The subscription hears no more; again: no effect."""
+        with self._lock:
+            self._subscriptions = tuple(other for other in self._subscriptions if other is not subscription)
+
+    def listeners(self, key: str) -> list[MemorySubscription]:
+        """The subscriptions that match a key, in order of joining."""
+        return [subscription for subscription in self._subscriptions if subscription.matches(key)]
+
+
+class MemoryBus:
+    """A session on an exchange; without one given, on an exchange of its own."""
+
+    def __init__(self, exchange: MemoryExchange | None = None, *, capacity: int = INBOX_CAPACITY) -> None:
+        self._exchange = exchange if exchange is not None else MemoryExchange()
+        self._capacity = capacity
+        self._own: list[MemorySubscription] = []
+        self._closed = False
+
+    def publish(self, message: BusMessage) -> None:
+        """The message queued with every matching subscription."""
+        self._require_open()
+        for subscription in self._exchange.listeners(checked_key(message.key)):
+            subscription.offer(message)
+
+    def subscribe(self, key_expression: str) -> MemorySubscription:
+        """A subscription to all keys the expression matches."""
+        self._require_open()
+        subscription = MemorySubscription(checked_expression(key_expression), self._exchange, self._capacity)
+        self._own.append(subscription)
+        self._exchange.join(subscription)
+        return subscription
+
+    def has_listener(self, key: str) -> bool:
+        """Whether a subscription of the exchange matches the key."""
+        self._require_open()
+        return bool(self._exchange.listeners(checked_key(key)))
+
+    def close(self) -> None:
+        """The session and its subscriptions ended."""
+        self._closed = True
+        for subscription in self._own:
+            subscription.close()
+        self._own.clear()
+
+    def _require_open(self) -> None:
+        if self._closed:
+            raise ServiceError("the bus is closed: nothing can be published or subscribed on it any more")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,190 @@
+"""What every bus does: the same claims hold in memory and on Zenoh (two sessions over loopback TCP)."""
+
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+
+import pytest
+
+from trigpoint.bus.memory_bus import MemoryBus, MemoryExchange
+from trigpoint.bus.ports import UNIDENTIFIED, Bus, BusMessage, Subscription
+from trigpoint.bus.zenoh_bus import ZenohBus, ZenohSettings
+from trigpoint.errors import InputError, ServiceError
+from trigpoint.events.envelope import EventIdentity
+
+SOON_S = 5.0  # a loopback message takes under a millisecond; the rest is a slow machine's share
+NEVER_S = 0.05  # long enough for a loopback message that should not come
+SMALL_INBOX = 10  # messages
+
+
+def free_endpoint() -> str:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+@pytest.fixture(params=["memory", "zenoh"])
+def pair(request: pytest.FixtureRequest) -> Iterator[tuple[Bus, Bus]]:
+    """Two sessions that hear each other: one to publish, one to listen."""
+    with ExitStack() as stack:
+        if request.param == "memory":
+            exchange = MemoryExchange()
+            buses: list[Bus] = [MemoryBus(exchange, capacity=SMALL_INBOX) for _ in range(2)]
+        else:
+            endpoint = free_endpoint()
+            listening = ZenohBus(ZenohSettings(listen=(endpoint,), inbox_capacity=SMALL_INBOX))
+            buses = [ZenohBus(ZenohSettings(connect=(endpoint,))), listening]
+        for bus in buses:
+            stack.enter_context(bus)
+        yield buses[0], buses[1]
+
+
+def message(key: str, sequence: int = 0) -> BusMessage:
+    return BusMessage(
+        key=key,
+        schema_name="trigpoint.v1.GnssFixReceived",
+        payload=bytes([sequence % 256]) * 100,
+        identity=EventIdentity("veh-å", "boot-1", sequence),
+        stamp_ns=1_700_000_000_123_456_789,
+        schema_version=3,
+    )
+
+
+def until_heard(bus: Bus, key: str) -> None:
+    """Discovery of a subscription takes a moment; what is published before it is lost by design."""
+    deadline = time.monotonic() + SOON_S
+    while not bus.has_listener(key):
+        assert time.monotonic() < deadline, f"nobody listens to {key}"
+        time.sleep(0.001)
+
+
+def all_received(subscription: Subscription, count: int) -> list[BusMessage]:
+    received = [subscription.receive(SOON_S) for _ in range(count)]
+    return [item for item in received if item is not None]
+
+
+def test_a_message_arrives_with_everything_it_was_sent_with(pair: tuple[Bus, Bus]) -> None:
+    publisher, listener = pair
+    subscription = listener.subscribe("t/v1/veh/*/obs/*")
+    until_heard(publisher, "t/v1/veh/a/obs/gnss")
+    publisher.publish(message("t/v1/veh/a/obs/gnss"))
+    assert subscription.receive(SOON_S) == message("t/v1/veh/a/obs/gnss")
+
+
+def test_one_publishers_messages_on_a_key_keep_their_order(pair: tuple[Bus, Bus]) -> None:
+    publisher, listener = pair
+    subscription = listener.subscribe("t/**")
+    until_heard(publisher, "t/a")
+    sent = [message("t/a", sequence) for sequence in range(SMALL_INBOX)]
+    for item in sent:
+        publisher.publish(item)
+    assert all_received(subscription, len(sent)) == sent
+
+
+def test_a_subscription_hears_only_what_its_expression_matches(pair: tuple[Bus, Bus]) -> None:
+    publisher, listener = pair
+    subscription = listener.subscribe("t/v1/ack/*")
+    until_heard(publisher, "t/v1/ack/a")
+    publisher.publish(message("t/v1/veh/a/obs/gnss", 1))
+    publisher.publish(message("t/v1/ack/a", 2))
+    assert [item.identity.sequence for item in all_received(subscription, 1)] == [2]
+    assert subscription.receive(NEVER_S) is None
+
+
+def test_two_subscriptions_each_hear_a_message(pair: tuple[Bus, Bus]) -> None:
+    publisher, listener = pair
+    first, second = listener.subscribe("t/a"), listener.subscribe("t/*")
+    until_heard(publisher, "t/a")
+    publisher.publish(message("t/a"))
+    assert first.receive(SOON_S) == second.receive(SOON_S) == message("t/a")
+
+
+def test_a_session_hears_itself(pair: tuple[Bus, Bus]) -> None:
+    publisher, _ = pair
+    subscription = publisher.subscribe("t/a")
+    publisher.publish(message("t/a"))
+    assert subscription.receive(SOON_S) == message("t/a")
+
+
+def test_a_full_inbox_loses_the_newest_and_says_how_many(pair: tuple[Bus, Bus]) -> None:
+    publisher, listener = pair
+    subscription, witness = listener.subscribe("t/a"), publisher.subscribe("t/end")
+    until_heard(publisher, "t/a")
+    for sequence in range(SMALL_INBOX + 7):
+        publisher.publish(message("t/a", sequence))
+    deadline = time.monotonic() + SOON_S
+    while subscription.lost < 7 and time.monotonic() < deadline:
+        witness.receive(0.001)
+    assert subscription.lost == 7
+    assert [item.identity.sequence for item in all_received(subscription, SMALL_INBOX)] == list(range(SMALL_INBOX))
+
+
+def test_nothing_is_received_when_nothing_comes(pair: tuple[Bus, Bus]) -> None:
+    assert pair[1].subscribe("t/a").receive(NEVER_S) is None
+
+
+def test_a_closed_subscription_hears_no_more(pair: tuple[Bus, Bus]) -> None:
+    publisher, _ = pair
+    subscription = publisher.subscribe("t/a")
+    publisher.publish(message("t/a"))
+    subscription.close()
+    assert subscription.receive(NEVER_S) is None
+
+
+def test_nobody_listens_where_nobody_subscribed(pair: tuple[Bus, Bus]) -> None:
+    assert not pair[0].has_listener("t/a")
+
+
+@pytest.mark.parametrize("key", ["", "/t", "t/", "t//a", "t/*", "t/**/a", "t/a?b", "t/#", "t/$a", "t/@a"])
+def test_a_key_with_an_empty_chunk_or_a_reserved_character_is_refused(pair: tuple[Bus, Bus], key: str) -> None:
+    with pytest.raises(InputError, match="key"):
+        pair[0].publish(message(key))
+
+
+@pytest.mark.parametrize("expression", ["", "t//a", "t/a*", "t/$*", "t/**/**", "t/?"])
+def test_an_expression_that_is_not_well_formed_is_refused(pair: tuple[Bus, Bus], expression: str) -> None:
+    with pytest.raises(InputError, match="key expression"):
+        pair[0].subscribe(expression)
+
+
+def test_a_closed_bus_refuses_to_publish(pair: tuple[Bus, Bus]) -> None:
+    pair[0].close()
+    with pytest.raises(ServiceError, match="closed"):
+        pair[0].publish(message("t/a"))
+
+
+def test_a_closed_bus_refuses_to_subscribe(pair: tuple[Bus, Bus]) -> None:
+    pair[0].close()
+    with pytest.raises(ServiceError, match="closed"):
+        pair[0].subscribe("t/a")
+
+
+def test_closing_twice_is_closing_once(pair: tuple[Bus, Bus]) -> None:
+    pair[0].close()
+    pair[0].close()
+
+
+def test_closing_a_bus_wakes_whoever_waits_on_it(pair: tuple[Bus, Bus]) -> None:
+    subscription = pair[0].subscribe("t/a")
+    pair[0].close()
+    started_s = time.monotonic()
+    assert subscription.receive(SOON_S) is None
+    assert time.monotonic() - started_s < SOON_S / 2  # it returned because of the close, not of the time
+
+
+def test_a_foreign_message_arrives_as_unidentified() -> None:
+    zenoh = pytest.importorskip("zenoh")
+    endpoint = free_endpoint()
+    with ZenohBus(ZenohSettings(listen=(endpoint,))) as bus:
+        subscription = bus.subscribe("t/a")
+        config = zenoh.Config()
+        config.insert_json5("connect/endpoints", f'["{endpoint}"]')
+        config.insert_json5("scouting/multicast/enabled", "false")
+        with zenoh.open(config) as stranger, stranger.declare_publisher("t/a") as publisher:
+            while not publisher.matching_status.matching:
+                time.sleep(0.001)
+            publisher.put(b"hello")
+            received = subscription.receive(SOON_S)
+    assert received is not None
+    assert (received.identity, received.payload) == (UNIDENTIFIED, b"hello")

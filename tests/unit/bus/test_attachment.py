@@ -1,0 +1,47 @@
+"""The attachment's bytes."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from trigpoint.bus.attachment import decode_attachment, encode_attachment
+from trigpoint.errors import InputError
+from trigpoint.events.envelope import EventIdentity
+
+INT64 = st.integers(-(2**63), 2**63 - 1)
+NAMES = st.text(st.characters(exclude_categories=["Cs"]), max_size=40)
+
+
+@given(source=NAMES, boot_id=NAMES, sequence=INT64, stamp_ns=INT64, schema_version=st.integers(0, 255))
+def test_what_was_attached_is_read_back(
+    source: str, boot_id: str, sequence: int, stamp_ns: int, schema_version: int
+) -> None:
+    identity = EventIdentity(source, boot_id, sequence)
+    attachment = encode_attachment(identity, stamp_ns=stamp_ns, schema_version=schema_version)
+    assert decode_attachment(attachment) == (identity, stamp_ns, schema_version)
+
+
+@given(attachment=st.binary(max_size=60))
+def test_any_bytes_are_read_or_refused(attachment: bytes) -> None:
+    try:
+        identity, _, _ = decode_attachment(attachment)
+    except InputError:
+        return
+    assert identity.source is not None
+
+
+def test_a_truncated_attachment_is_refused() -> None:
+    whole = encode_attachment(EventIdentity("vehicle", "", 7), stamp_ns=1, schema_version=1)
+    with pytest.raises(InputError, match="ends inside the source of 7 bytes"):
+        decode_attachment(whole[:-1])
+
+
+def test_an_attachment_of_another_layout_is_refused() -> None:
+    whole = encode_attachment(EventIdentity("vehicle", "boot", 7), stamp_ns=1, schema_version=1)
+    with pytest.raises(InputError, match="layout 1"):
+        decode_attachment(b"\x02" + whole[1:])
+
+
+def test_a_sequence_beyond_64_bits_is_refused() -> None:
+    with pytest.raises(InputError, match="sequence"):
+        encode_attachment(EventIdentity("vehicle", "boot", 2**63), stamp_ns=1, schema_version=1)
