@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from pyproj import CRS, Proj, Transformer
+from pyproj import CRS, Geod, Proj, Transformer
 from pyproj.exceptions import CRSError, ProjError
 from pyproj.transformer import TransformerGroup
 
@@ -129,3 +129,31 @@ def wgs84_from_map(position: MapPosition, frame: MapFrame) -> Wgs84Position:
     """One position in degrees."""
     lat_deg, lon_deg = wgs84_from_map_points(np.array([[position.x_m, position.y_m]]), frame)
     return Wgs84Position(float(lat_deg[0]), float(lon_deg[0]))
+
+
+@dataclass(frozen=True, slots=True)
+class CrsDefinition:
+    """What a GIS file says of a CRS: its name, its code at an authority ("" and 0 without one), and its WKT 1."""
+
+    name: str
+    authority: str
+    code: int
+    wkt: str
+
+
+def crs_definition(crs: str) -> CrsDefinition:
+    """The definition of a CRS, as WKT 1 in GDAL's dialect. Raises FrameRefused for a CRS unknown or without WKT 1."""
+    parsed = _parsed_crs(crs)
+    try:
+        wkt = parsed.to_wkt("WKT1_GDAL")
+    except CRSError as error:
+        raise FrameRefused(f"CRS {crs!r} has no WKT 1: {error}") from error
+    authority, code = parsed.to_authority() or ("", "0")
+    return CrsDefinition(parsed.name, authority, int(code) if code.isdecimal() else 0, wkt)
+
+
+def geodesic_distances_m(from_lat_deg: float, from_lon_deg: float, *, lat_deg: Floats, lon_deg: Floats) -> Floats:
+    """True metres (n,) on the WGS84 ellipsoid from one position to others (n,), in degrees (Karney 2013)."""
+    here_lon_deg, here_lat_deg = np.full(len(lat_deg), from_lon_deg), np.full(len(lat_deg), from_lat_deg)
+    _, _, distance_m = Geod(ellps="WGS84").inv(here_lon_deg, here_lat_deg, lon_deg, lat_deg)
+    return np.asarray(distance_m, dtype=np.float64)

@@ -1,0 +1,41 @@
+"""What a landmark store can do, whatever keeps it."""
+
+from collections.abc import Iterator
+from typing import Protocol
+
+from trigpoint.landmarks.model import Checkpoint, Landmark, LandmarkChanges, MapChange, MapRow, MapVersion
+from trigpoint.landmarks.queries import LandmarkQuery
+
+
+class LandmarkStore(Protocol):
+    """A projection of the log: every map version, and how far the log has been taken in."""
+
+    def apply(self, change: MapChange, checkpoint: Checkpoint) -> None:
+        """One map version and the checkpoint that goes with it, both or neither.
+
+        Raises InputError for a version not after the last one, for a frame other than that of the versions
+        before, for an id closed that is not valid and for one opened that still is; ServiceError if the
+        database cannot be written.
+        """
+
+    def landmarks(self, query: LandmarkQuery) -> tuple[Landmark, ...]:
+        """The landmarks that meet a query; none while no version is there. Raises InputError for an unknown version."""
+
+    def changes(self, query: LandmarkQuery, *, since: int) -> LandmarkChanges:
+        """What changed between version `since` and the query's, among the landmarks that meet the query.
+
+        `removed` are ids that met it at `since` and no longer do. Raises InputError for an unknown version
+        and for a limit, which would make removals of landmarks that are only cut off.
+        """
+
+    def map_versions(self) -> tuple[MapVersion, ...]:
+        """All map versions in order."""
+
+    def checkpoint(self) -> Checkpoint:
+        """How far the log has been taken in."""
+
+    def rows(self) -> Iterator[MapRow]:
+        """Every row of every version, in no particular order: what two stores are compared by."""
+
+    def close(self) -> None:
+        """Nothing more is held open."""
