@@ -1,0 +1,363 @@
+"""The wire form of events: Protobuf payloads and the names of their schemas.
+
+A GNSS fix is a foxglove.LocationFix, every other event the message of its own name in package trigpoint.v1.
+Identity and time of measurement are not part of a payload: whatever carries it carries them.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from operator import attrgetter
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
+from google.protobuf.message import DecodeError, Message
+from numpy.typing import NDArray
+
+from trigpoint.errors import EventRejected
+from trigpoint.events.corrected import AnchorLabelled, Corrected
+from trigpoint.events.estimated import Estimated, FixJudged, GateAlarmed, PoseFiltered
+from trigpoint.events.mapped import (
+    AnchorAssociated,
+    ImageOffsetSolved,
+    LandmarkSolved,
+    Mapped,
+    MapSolved,
+    TrajectorySolved,
+)
+from trigpoint.events.observed import (
+    EventRefused,
+    GnssFixReceived,
+    ImuMeasured,
+    LandmarkDetection,
+    LandmarksDetected,
+    MapFramePinned,
+    Observed,
+    VehicleDescribed,
+    WheelPairMeasured,
+    WheelSpeedMeasured,
+)
+from trigpoint_schemas.v1 import corrected_pb2, estimated_pb2, mapped_pb2, observed_pb2
+
+Event = Observed | EventRefused | MapFramePinned | Corrected | Estimated | Mapped
+EventT = TypeVar("EventT")
+MessageT = TypeVar("MessageT", bound=Message)
+Floats = NDArray[np.float64]
+
+CURRENT_VERSION = 1  # of the package trigpoint.v<version>
+
+
+@dataclass(frozen=True, slots=True)
+class _Form(Generic[EventT, MessageT]):
+    """How one class of events is written: the message class and both directions."""
+
+    event_class: type[EventT]
+    message_class: type[MessageT]
+    message_of: Callable[[EventT], MessageT]
+    event_of: Callable[[MessageT], EventT]
+
+
+def _flat(event_class: type[EventT], message_class: type[MessageT]) -> _Form[EventT, MessageT]:
+    """The form of an event whose fields are all scalars that the message has under the same names."""
+    names = [field.name for field in fields(event_class)]  # type: ignore[arg-type]  # all are dataclasses
+    values_of = attrgetter(*names)
+
+    def message_of(event: EventT) -> MessageT:
+        return message_class(**dict(zip(names, values_of(event), strict=True)))
+
+    def event_of(message: MessageT) -> EventT:
+        return event_class(**dict(zip(names, values_of(message), strict=True)))
+
+    return _Form(event_class, message_class, message_of, event_of)
+
+
+def _listed(array: Floats, shape: tuple[int, ...]) -> list[float]:
+    """The array's numbers row by row. Raises EventRejected for another shape."""
+    if array.shape != shape:
+        raise EventRejected("unencodable", f"array of shape {array.shape}, expected {shape}")
+    values: list[float] = np.asarray(array, dtype=np.float64).ravel().tolist()
+    return values
+
+
+def _array(values: Sequence[float], shape: tuple[int, ...]) -> Floats:
+    """The numbers as an array. Raises EventRejected if there are not as many as the shape asks for."""
+    if len(values) != math.prod(shape):
+        raise EventRejected("undecodable", f"{len(values)} numbers, expected {math.prod(shape)} of shape {shape}")
+    return np.array(values, dtype=np.float64).reshape(shape)
+
+
+def _fix_message(event: GnssFixReceived) -> LocationFix:
+    """The variance's sign is sigma's, so that even a nonsensical sigma comes back as it was sent."""
+    message = LocationFix(latitude=event.lat_deg, longitude=event.lon_deg, altitude=event.height_m)
+    if not math.isnan(event.sigma_m):
+        variance_m2 = math.copysign(event.sigma_m * event.sigma_m, event.sigma_m)
+        message.position_covariance.extend((variance_m2, 0.0, 0.0, 0.0, variance_m2, 0.0, 0.0, 0.0, variance_m2))
+        message.position_covariance_type = LocationFix.DIAGONAL_KNOWN
+    return message
+
+
+def _fix_event(message: LocationFix) -> GnssFixReceived:
+    """Sigma is that of the worse horizontal axis; the square root of a square is exact from 1e-150 to 1e150."""
+    sigma_m = math.nan
+    if message.position_covariance_type != LocationFix.UNKNOWN:
+        covariance = message.position_covariance
+        if len(covariance) != 9:
+            raise EventRejected("undecodable", f"position covariance has {len(covariance)} numbers, expected 9")
+        variance_m2 = max(covariance[0], covariance[4])
+        sigma_m = math.copysign(math.sqrt(abs(variance_m2)), variance_m2)
+    return GnssFixReceived(
+        lat_deg=message.latitude, lon_deg=message.longitude, height_m=message.altitude, sigma_m=sigma_m
+    )
+
+
+def _sweep_message(event: LandmarksDetected) -> observed_pb2.LandmarksDetected:
+    message = observed_pb2.LandmarksDetected()
+    add = message.detections.add
+    for seen in event.detections:
+        add(
+            range_m=seen.range_m,
+            bearing_rad=seen.bearing_rad,
+            kind=seen.kind,
+            signature=seen.signature,
+            diameter_m=seen.diameter_m,
+        )
+    return message
+
+
+def _sweep_event(message: observed_pb2.LandmarksDetected) -> LandmarksDetected:
+    return LandmarksDetected(
+        detections=tuple(
+            LandmarkDetection(seen.range_m, seen.bearing_rad, seen.kind, seen.signature, seen.diameter_m)
+            for seen in message.detections
+        )
+    )
+
+
+def _pose_message(event: PoseFiltered) -> estimated_pb2.PoseFiltered:
+    return estimated_pb2.PoseFiltered(
+        vehicle=event.vehicle,
+        boot_id=event.boot_id,
+        x_m=event.x_m,
+        y_m=event.y_m,
+        heading_rad=event.heading_rad,
+        speed_mps=event.speed_mps,
+        covariance=_listed(event.covariance, (3, 3)),
+    )
+
+
+def _pose_event(message: estimated_pb2.PoseFiltered) -> PoseFiltered:
+    return PoseFiltered(
+        vehicle=message.vehicle,
+        boot_id=message.boot_id,
+        x_m=message.x_m,
+        y_m=message.y_m,
+        heading_rad=message.heading_rad,
+        speed_mps=message.speed_mps,
+        covariance=_array(message.covariance, (3, 3)),
+    )
+
+
+def _map_message(event: MapSolved) -> mapped_pb2.MapSolved:
+    return mapped_pb2.MapSolved(
+        map_version=event.map_version,
+        method=event.method,
+        settings_json=event.settings_json,
+        inputs=[mapped_pb2.StreamCount(stream=stream, count=count) for stream, count in event.inputs],
+        landmark_count=event.landmark_count,
+        anchor_count=event.anchor_count,
+        wall_s=event.wall_s,
+    )
+
+
+def _map_event(message: mapped_pb2.MapSolved) -> MapSolved:
+    return MapSolved(
+        map_version=message.map_version,
+        method=message.method,
+        settings_json=message.settings_json,
+        inputs=tuple((row.stream, row.count) for row in message.inputs),
+        landmark_count=message.landmark_count,
+        anchor_count=message.anchor_count,
+        wall_s=message.wall_s,
+    )
+
+
+def _trajectory_message(event: TrajectorySolved) -> mapped_pb2.TrajectorySolved:
+    count = len(event.stamp_ns)
+    return mapped_pb2.TrajectorySolved(
+        map_version=event.map_version,
+        vehicle=event.vehicle,
+        boot_id=event.boot_id,
+        stamp_ns=event.stamp_ns.tolist(),
+        pose=_listed(event.pose, (count, 3)),
+        covariance=_listed(event.covariance, (count, 3, 3)),
+        calibration=[
+            mapped_pb2.CalibrationState(name=name, value=value, sigma=sigma) for name, value, sigma in event.calibration
+        ],
+    )
+
+
+def _trajectory_event(message: mapped_pb2.TrajectorySolved) -> TrajectorySolved:
+    count = len(message.stamp_ns)
+    return TrajectorySolved(
+        map_version=message.map_version,
+        vehicle=message.vehicle,
+        boot_id=message.boot_id,
+        stamp_ns=np.array(message.stamp_ns, dtype=np.int64),
+        pose=_array(message.pose, (count, 3)),
+        covariance=_array(message.covariance, (count, 3, 3)),
+        calibration=tuple((state.name, state.value, state.sigma) for state in message.calibration),
+    )
+
+
+def _landmark_message(event: LandmarkSolved) -> mapped_pb2.LandmarkSolved:
+    message = mapped_pb2.LandmarkSolved(
+        map_version=event.map_version,
+        landmark=event.landmark,
+        kind=event.kind,
+        signature=event.signature,
+        position_m=_listed(event.position_m, (2,)),
+        covariance_m2=_listed(event.covariance_m2, (2, 2)),
+        observation_count=event.observation_count,
+        vehicles=event.vehicles,
+        first_seen_ns=event.first_seen_ns,
+        last_seen_ns=event.last_seen_ns,
+        anchors=event.anchors,
+    )
+    for vehicle, boot_id, sequence in event.observations:
+        message.observations.add(vehicle=vehicle, boot_id=boot_id, sequence=sequence)
+    return message
+
+
+def _landmark_event(message: mapped_pb2.LandmarkSolved) -> LandmarkSolved:
+    return LandmarkSolved(
+        map_version=message.map_version,
+        landmark=message.landmark,
+        kind=message.kind,
+        signature=message.signature,
+        position_m=_array(message.position_m, (2,)),
+        covariance_m2=_array(message.covariance_m2, (2, 2)),
+        observation_count=message.observation_count,
+        vehicles=tuple(message.vehicles),
+        first_seen_ns=message.first_seen_ns,
+        last_seen_ns=message.last_seen_ns,
+        anchors=tuple(message.anchors),
+        observations=tuple((sweep.vehicle, sweep.boot_id, sweep.sequence) for sweep in message.observations),
+    )
+
+
+def _association_message(event: AnchorAssociated) -> mapped_pb2.AnchorAssociated:
+    return mapped_pb2.AnchorAssociated(
+        map_version=event.map_version,
+        anchor=event.anchor,
+        landmark=event.landmark,
+        reason=event.reason,
+        residual_m=_listed(event.residual_m, (2,)),
+    )
+
+
+def _association_event(message: mapped_pb2.AnchorAssociated) -> AnchorAssociated:
+    return AnchorAssociated(
+        map_version=message.map_version,
+        anchor=message.anchor,
+        landmark=message.landmark,
+        reason=message.reason,
+        residual_m=_array(message.residual_m, (2,)),
+    )
+
+
+def _offset_message(event: ImageOffsetSolved) -> mapped_pb2.ImageOffsetSolved:
+    return mapped_pb2.ImageOffsetSolved(
+        map_version=event.map_version,
+        image=event.image,
+        offset_m=_listed(event.offset_m, (2,)),
+        covariance_m2=_listed(event.covariance_m2, (2, 2)),
+    )
+
+
+def _offset_event(message: mapped_pb2.ImageOffsetSolved) -> ImageOffsetSolved:
+    return ImageOffsetSolved(
+        map_version=message.map_version,
+        image=message.image,
+        offset_m=_array(message.offset_m, (2,)),
+        covariance_m2=_array(message.covariance_m2, (2, 2)),
+    )
+
+
+_FORMS: tuple[_Form[Any, Any], ...] = (
+    _flat(VehicleDescribed, observed_pb2.VehicleDescribed),
+    _flat(WheelSpeedMeasured, observed_pb2.WheelSpeedMeasured),
+    _flat(WheelPairMeasured, observed_pb2.WheelPairMeasured),
+    _flat(ImuMeasured, observed_pb2.ImuMeasured),
+    _Form(GnssFixReceived, LocationFix, _fix_message, _fix_event),
+    _Form(LandmarksDetected, observed_pb2.LandmarksDetected, _sweep_message, _sweep_event),
+    _flat(EventRefused, observed_pb2.EventRefused),
+    _flat(MapFramePinned, observed_pb2.MapFramePinned),
+    _flat(AnchorLabelled, corrected_pb2.AnchorLabelled),
+    _flat(FixJudged, estimated_pb2.FixJudged),
+    _Form(PoseFiltered, estimated_pb2.PoseFiltered, _pose_message, _pose_event),
+    _flat(GateAlarmed, estimated_pb2.GateAlarmed),
+    _Form(MapSolved, mapped_pb2.MapSolved, _map_message, _map_event),
+    _Form(TrajectorySolved, mapped_pb2.TrajectorySolved, _trajectory_message, _trajectory_event),
+    _Form(LandmarkSolved, mapped_pb2.LandmarkSolved, _landmark_message, _landmark_event),
+    _Form(AnchorAssociated, mapped_pb2.AnchorAssociated, _association_message, _association_event),
+    _Form(ImageOffsetSolved, mapped_pb2.ImageOffsetSolved, _offset_message, _offset_event),
+)
+_WRITING: Mapping[type, tuple[str, Callable[[Any], Message]]] = {
+    form.event_class: (form.message_class.DESCRIPTOR.full_name, form.message_of) for form in _FORMS
+}
+_READING: Mapping[str, tuple[Callable[[bytes], Any], Callable[[Any], Event]]] = {
+    form.message_class.DESCRIPTOR.full_name: (form.message_class.FromString, form.event_of) for form in _FORMS
+}
+_BY_SCHEMA: Mapping[str, _Form[Any, Any]] = {form.message_class.DESCRIPTOR.full_name: form for form in _FORMS}
+
+
+def encode(event: Event) -> tuple[str, bytes]:
+    """The event's schema name and payload. Raises EventRejected for a value its schema cannot hold."""
+    schema, message_of = _WRITING[type(event)]
+    try:
+        return schema, message_of(event).SerializeToString()
+    except (ValueError, TypeError) as error:
+        raise EventRejected("unencodable", f"{type(event).__name__}: {error}") from error
+
+
+def decode(schema: str, payload: bytes) -> Event:
+    """The event a payload holds, equal to the one encoded. Raises EventRejected, "unknown schema" or "undecodable"."""
+    reading = _READING.get(schema)
+    if reading is None:
+        raise EventRejected("unknown schema", f"{schema!r} is none of {len(_READING)} known")
+    message_from, event_of = reading
+    try:
+        return event_of(message_from(payload))
+    except DecodeError as error:
+        raise EventRejected("undecodable", f"{schema}, {len(payload)} bytes: {error}") from error
+
+
+def event_classes() -> tuple[type, ...]:
+    """All classes of events."""
+    return tuple(_WRITING)
+
+
+def event_class(schema: str) -> type | None:
+    """The class of events a schema holds, None for an unknown schema."""
+    form = _BY_SCHEMA.get(schema)
+    return form.event_class if form else None
+
+
+def schema_name(event_class: type) -> str:
+    """The full name of the Protobuf message a class of events is written as."""
+    return _WRITING[event_class][0]
+
+
+def schema_version(schema: str) -> int:
+    """The version a schema's package names (`trigpoint.v1.…`), 1 for Foxglove's, 0 for an unknown schema."""
+    return CURRENT_VERSION if schema in _BY_SCHEMA else 0
+
+
+def message_class(schema: str) -> type[Message]:
+    """The Protobuf class of a known schema. Raises EventRejected, "unknown schema"."""
+    form = _BY_SCHEMA.get(schema)
+    if form is None:
+        raise EventRejected("unknown schema", f"{schema!r} is none of {len(_BY_SCHEMA)} known")
+    found: type[Message] = form.message_class
+    return found
