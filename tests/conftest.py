@@ -1,0 +1,55 @@
+"""What every test may ask for, and the rule that some tests must not be skipped in continuous integration."""
+
+from collections.abc import Generator
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+RECORDED_DRIVES = REPOSITORY.parent / "shared" / "data"
+
+pytest_plugins = ["pytester"]
+
+
+@pytest.fixture(scope="session")
+def recorded_drives() -> Path:
+    """The folder of recorded drives beside the repository; ask for it in tests marked `data`."""
+    return RECORDED_DRIVES
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--forbid-skipped",
+        action="append",
+        default=[],
+        metavar="MARK",
+        help="a skipped test with this mark, and any file skipped whole, counts as failed; may be given more than once",
+    )
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    if item.get_closest_marker("data") and not RECORDED_DRIVES.is_dir():
+        pytest.skip(f"recorded drives are not at {RECORDED_DRIVES}")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    report = yield
+    forbidden = [mark for mark in item.config.getoption("--forbid-skipped") if item.get_closest_marker(mark)]
+    if report.skipped and forbidden and not hasattr(report, "wasxfail"):
+        report.outcome = "failed"
+        report.longrepr = f"skipped, and a test marked {forbidden[0]} must not be: {report.longrepr}"
+    return report
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(
+    collector: pytest.Collector,
+) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    report = yield
+    if report.skipped and collector.config.getoption("--forbid-skipped"):
+        report.outcome = "failed"
+        report.longrepr = f"skipped whole, its marks unseen: {report.longrepr}"
+    return report
