@@ -1,0 +1,1 @@
+"""The figures the project promises, each measured through the command a user would type."""

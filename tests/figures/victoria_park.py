@@ -1,0 +1,71 @@
+"""Victoria Park: GPS withheld 30 s of every 60 s, the antenna's distance to the withheld fixes, and the cold start."""
+
+from figures.figure import Figure, Measurement, at_most, between
+from figures.workbench import Outcome, Workbench
+
+PERIOD_S, DURATION_S = 60, 30
+OFFSETS_S = (0, 30)
+PAPER, BEST = "loose", "anchored"  # the paper's edges (10 m, sigma 5 m); the settings judged best
+
+
+def cold_start(bench: Workbench) -> tuple[Outcome, ...]:
+    """Convert, ingest and build, each a process of its own."""
+    raw, data = bench.path("raw"), bench.path("data")
+    return (
+        bench.run("convert", "victoria-park", bench.drive("victoria_park"), raw),
+        bench.run("ingest", f"{raw}/victoria-park.mcap", "--data", data),
+        bench.run("build", "--data", data, "--json"),
+    )
+
+
+def withheld(bench: Workbench, *, method: str, offset_s: int) -> Outcome:
+    """What `evaluate gnss` says of one method and one half of the fixes."""
+    cold_start(bench)
+    return bench.run(
+        "evaluate", "gnss", "--data", bench.path("data"), "--method", method,
+        "--withhold-period-s", PERIOD_S, "--withhold-duration-s", DURATION_S, "--withhold-offset-s", offset_s, "--json",
+    )  # fmt: skip
+
+
+def withheld_figure(name: str, path: str, limit: float | None, *, method: str, offset_s: int) -> Figure:
+    """One number of `evaluate gnss`."""
+
+    def measure(bench: Workbench) -> Measurement:
+        outcome = withheld(bench, method=method, offset_s=offset_s)
+        return Measurement(value=outcome.at(path), command=outcome.command)
+
+    target = None if limit is None else at_most(limit)
+    return Figure(name=f"{name}, offset {offset_s} s", unit="m", target=target, measure=measure)
+
+
+def start_seconds(bench: Workbench) -> Measurement:
+    """The three commands' durations together."""
+    steps = cold_start(bench)
+    return Measurement(value=sum(step.wall_s for step in steps), command=" && ".join(step.command for step in steps))
+
+
+def landmark_count(bench: Workbench) -> Measurement:
+    """The landmarks of the built map."""
+    build = cold_start(bench)[-1]
+    return Measurement(value=build.at("landmarks.count"), command=build.command)
+
+
+FIGURES = (
+    Figure(name="convert, ingest and build from a cold start", unit="s", target=at_most(60.0), measure=start_seconds),
+    Figure(name="landmarks found", unit="", target=between(180, 350), measure=landmark_count),
+    *(
+        withheld_figure(name, path, limit, method=method, offset_s=offset_s)
+        for offset_s in OFFSETS_S
+        for name, path, limit, method in (
+            ("paper's edges, median", "error_m.median", 1.0, PAPER),
+            ("paper's edges, mean", "error_m.mean", 1.2, PAPER),
+            ("paper's edges, p95", "error_m.p95", 3.0, PAPER),
+            ("paper's edges, between the two paths, median", "path_difference_m.median", 0.5, PAPER),
+            ("best settings, median", "error_m.median", 0.75, BEST),
+            ("best settings, mean", "error_m.mean", 1.0, BEST),
+            ("best settings, p95", "error_m.p95", 2.5, BEST),
+            ("best settings, between the two paths, median", "path_difference_m.median", 0.25, BEST),
+            ("filter alone, median", "filter_error_m.median", 2.5, PAPER),
+        )
+    ),
+)
