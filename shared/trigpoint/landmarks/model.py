@@ -187,10 +187,11 @@ def changes_between(
     before: Sequence[Landmark], after: Sequence[Landmark], *, since: int, as_of: int
 ) -> LandmarkChanges:
     """The difference between two answers to the same query at two versions."""
+    opened_at = {landmark.landmark: landmark.valid_from_version for landmark in before}
     held = {landmark.landmark for landmark in after}
     return LandmarkChanges(
         since=since,
         as_of=as_of,
-        changed=tuple(landmark for landmark in after if landmark.valid_from_version > since),
-        removed=tuple(sorted(landmark.landmark for landmark in before if landmark.landmark not in held)),
+        changed=tuple(row for row in after if opened_at.get(row.landmark) != row.valid_from_version),
+        removed=tuple(sorted(opened_at.keys() - held)),
     )

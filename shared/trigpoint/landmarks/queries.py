@@ -1,13 +1,15 @@
 """What can be asked of a landmark map, checked before it is asked."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
 from trigpoint.errors import InputError
 from trigpoint.geodesy.projection import geodesic_distances_m
-from trigpoint.landmarks.model import Landmark
+from trigpoint.landmarks.model import Landmark, LandmarkChanges, MapVersion, changes_between
 
 METRES_PER_DEGREE = 110_574.0  # of latitude, at the equator, where WGS84 has the fewest; of longitude times cos(lat)
 LAT_LIMIT_DEG = 90.0
@@ -41,9 +43,7 @@ class DegreeBox:
 
     def contains(self, lat_deg: float, lon_deg: float) -> bool:
         """Whether a position lies in the box or on its edge."""
-        return (
-            self.lon_min_deg <= lon_deg <= self.lon_max_deg and self.lat_min_deg <= lat_deg <= self.lat_max_deg
-        )
+        return self.lon_min_deg <= lon_deg <= self.lon_max_deg and self.lat_min_deg <= lat_deg <= self.lat_max_deg
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,7 +95,32 @@ def box_around(disc: Disc) -> DegreeBox:
     )
 
 
-def nearest_within(landmarks: list[Landmark], disc: Disc) -> list[Landmark]:
+def area_box(query: LandmarkQuery) -> DegreeBox | None:
+    """A box that holds everything a query can find, None if that is anywhere."""
+    if query.near is None:
+        return query.bbox
+    around = box_around(query.near)
+    if query.bbox is None:
+        return around
+    narrow = around.lon_max_deg - around.lon_min_deg < query.bbox.lon_max_deg - query.bbox.lon_min_deg
+    return around if narrow else query.bbox
+
+
+def answered(found: Sequence[Landmark], query: LandmarkQuery) -> tuple[Landmark, ...]:
+    """The answer to a query from landmarks that meet its kind and version, and its area at least nearly."""
+    boxed = [landmark for landmark in found if query.bbox is None or _inside(landmark, query.bbox)]
+    if query.near is None:
+        ordered = sorted(boxed, key=lambda landmark: landmark.landmark)
+    else:
+        ordered = _nearest_within(boxed, query.near)
+    return tuple(ordered[: query.limit])
+
+
+def _inside(landmark: Landmark, bbox: DegreeBox) -> bool:
+    return bbox.contains(landmark.lat_deg, landmark.lon_deg)
+
+
+def _nearest_within(landmarks: list[Landmark], disc: Disc) -> list[Landmark]:
     """Those inside the disc, nearest first, then by id."""
     if not landmarks:
         return []
@@ -109,8 +134,41 @@ def nearest_within(landmarks: list[Landmark], disc: Disc) -> list[Landmark]:
     return [landmark for _, landmark in sorted(inside, key=lambda pair: (pair[0], pair[1].landmark))]
 
 
-def require_known_version(map_version: int, known: tuple[int, ...]) -> None:
+class _Answering(Protocol):
+    def landmarks(self, query: LandmarkQuery) -> tuple[Landmark, ...]: ...
+
+    def map_versions(self) -> tuple[MapVersion, ...]: ...
+
+
+def changes_of(store: _Answering, query: LandmarkQuery, *, since: int) -> LandmarkChanges:
+    """The changes a store answers, from its two answers to the query. Raises InputError as `LandmarkStore.changes`."""
+    if query.limit is not None:
+        raise InputError(f"limit {query.limit} cannot go with changes since version {since}: they are whole or wrong")
+    known = tuple(version.map_version for version in store.map_versions())
+    require_known_version(since, known)
+    as_of = known[-1] if query.as_of is None else query.as_of
+    before = store.landmarks(replace(query, as_of=since))
+    after = store.landmarks(replace(query, as_of=as_of))
+    return changes_between(before, after, since=since, as_of=as_of)
+
+
+def require_known_version(map_version: int, known: Sequence[int]) -> None:
     """Raises InputError, naming the known ones, if a map version is not among them."""
     if map_version not in known:
         limits = f"{known[0]} to {known[-1]} are there" if known else "no version is there yet"
         raise InputError(f"map version {map_version} is unknown: {limits}")
+
+
+def require_next_version(version: MapVersion, held: Sequence[MapVersion]) -> None:
+    """Raises InputError if a version does not come after those held, or is in another frame."""
+    if not held:
+        return
+    if version.map_version <= held[-1].map_version:
+        raise InputError(f"map version {version.map_version}: {held[-1].map_version} was already applied")
+    frame, pinned = _frame_name(version), _frame_name(held[-1])
+    if frame != pinned:
+        raise InputError(f"map version {version.map_version} is in {frame}: the map is in {pinned}")
+
+
+def _frame_name(version: MapVersion) -> str:
+    return f"{version.crs} from E {version.origin_easting_m} m, N {version.origin_northing_m} m"

@@ -1,0 +1,1 @@
+"""Map versions from events, and answers about the map: pure functions."""

@@ -1,0 +1,220 @@
+"""The landmark store as one GeoPackage file, which QGIS and GDAL open as it is."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+from sqlalchemy import Connection, Table, delete, insert, select, text
+from sqlalchemy.exc import IntegrityError
+
+from trigpoint.errors import InputError
+from trigpoint.landmarks import geopackage_schema as schema
+from trigpoint.landmarks import records, tables
+from trigpoint.landmarks.geopackage_file import close, database_errors, driver_of, insert_reference, opened, transaction
+from trigpoint.landmarks.geopackage_query import (
+    LANDMARK_TABLES,
+    WIDEST_INDEXED_DEG,
+    QueryShape,
+    bound_box,
+    clipped,
+    grid_window,
+    landmark_of,
+    landmark_sql,
+)
+from trigpoint.landmarks.model import Checkpoint, Landmark, LandmarkChanges, MapChange, MapRow, MapVersion
+from trigpoint.landmarks.queries import (
+    DegreeBox,
+    LandmarkQuery,
+    answered,
+    area_box,
+    changes_of,
+    require_known_version,
+    require_next_version,
+)
+
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+EXTENT_SQL = "SELECT min(lon_deg), min(lat_deg), max(lon_deg), max(lat_deg) FROM {table}"
+
+Record = dict[str, object]
+
+
+class GeoPackageStore:
+    """A LandmarkStore in the file at `path`; see `opened` for what that raises. Not for several threads at once."""
+
+    def __init__(self, path: Path, *, read_only: bool = False) -> None:
+        self._path = path
+        self._connection: Connection = opened(path, read_only=read_only)
+        self._extent: tuple[int, DegreeBox | None] | None = None
+
+    def apply(self, change: MapChange, checkpoint: Checkpoint) -> None:
+        """One map version and its checkpoint in one transaction."""
+        with database_errors(self._path), transaction(self._connection):
+            versions = self._versions()
+            require_next_version(change.version, versions)
+            if not versions:
+                self._adopt_crs(change.version.crs)
+            self._write(change)
+            self._write_checkpoint(checkpoint)
+            self._date_layers(change.version.solved_ns)
+        self._extent = None
+
+    def landmarks(self, query: LandmarkQuery) -> tuple[Landmark, ...]:
+        """The landmarks that meet a query."""
+        with database_errors(self._path):
+            older = query.as_of is not None and self._is_older(query.as_of)
+            sources = LANDMARK_TABLES if older else LANDMARK_TABLES[:1]
+            found = [landmark for source in sources for landmark in self._found(source, query, older=older)]
+        return answered(found, query)
+
+    def changes(self, query: LandmarkQuery, *, since: int) -> LandmarkChanges:
+        """What changed since a version among the landmarks that meet a query."""
+        return changes_of(self, query, since=since)
+
+    def map_versions(self) -> tuple[MapVersion, ...]:
+        """All map versions in order."""
+        with database_errors(self._path):
+            return self._versions()
+
+    def checkpoint(self) -> Checkpoint:
+        """How far the log has been taken in."""
+        held = select(tables.checkpoints.c.stream, tables.checkpoints.c.next_number)
+        with database_errors(self._path):
+            return Checkpoint(tuple(sorted((stream, number) for stream, number in self._connection.execute(held))))
+
+    def rows(self) -> Iterator[MapRow]:
+        """Every row of every version."""
+        with database_errors(self._path):
+            yield from self._versions()
+            for source in LANDMARK_TABLES:
+                yield from self._found(source, LandmarkQuery(), older=False)
+            yield from map(records.trajectory_of, self._records(tables.trajectories))
+            yield from map(records.anchor_of, self._records(tables.anchors))
+            yield from map(records.image_offset_of, self._records(tables.image_offsets))
+
+    def damage(self) -> tuple[str, ...]:
+        """What SQLite finds wrong with the file and its spatial indexes; nothing for a sound one."""
+        indexes = (schema.rtree_name(layer.name) for layer in schema.FEATURE_LAYERS if layer.indexed)
+        statements = ("PRAGMA integrity_check", *(f"SELECT rtreecheck('{index}')" for index in indexes))
+        with database_errors(self._path):
+            said = [row[0] for statement in statements for row in self._connection.execute(text(statement))]
+        return tuple(line for line in said if line != "ok")
+
+    def close(self) -> None:
+        """The file closed."""
+        close(self._connection)
+
+    def _records(self, source: Table) -> Iterator[Record]:
+        for record in self._connection.execute(select(source)).mappings():
+            yield dict(record)
+
+    def _versions(self) -> tuple[MapVersion, ...]:
+        ordered = select(tables.map_versions).order_by(tables.map_versions.c.map_version)
+        return tuple(records.map_version_of(dict(record)) for record in self._connection.execute(ordered).mappings())
+
+    def _is_older(self, as_of: int) -> bool:
+        numbers = select(tables.map_versions.c.map_version).order_by(tables.map_versions.c.map_version)
+        known: tuple[int, ...] = tuple(self._connection.scalars(numbers))
+        require_known_version(as_of, known)
+        return as_of < known[-1]
+
+    def _found(self, source: Table, query: LandmarkQuery, *, older: bool) -> Iterable[Landmark]:
+        bound: Record = {"kind": query.kind, "as_of": query.as_of, "limit": query.limit}
+        box = area_box(query)
+        window = None
+        if box is not None:
+            window = self._window(box)
+            bound |= bound_box(box) | (window or {})
+        shape = QueryShape(
+            windowed=window is not None,
+            boxed=box is not None,
+            kind=query.kind is not None,
+            as_of=older,
+            limited=query.limit is not None and box is None,
+        )
+        return map(landmark_of, driver_of(self._connection).execute(landmark_sql(source, shape), bound))
+
+    def _window(self, box: DegreeBox) -> dict[str, float] | None:
+        """The grid window to look a box up in; None where the index cannot serve and columns must."""
+        extent = self._held_extent()
+        inside = None if extent is None else clipped(box, extent)
+        if extent is None or inside is None or extent.lon_max_deg - extent.lon_min_deg > WIDEST_INDEXED_DEG:
+            return None
+        crs = self._connection.scalar(select(tables.map_versions.c.crs).limit(1))
+        return grid_window(inside, str(crs))
+
+    def _held_extent(self) -> DegreeBox | None:
+        """The box of all landmarks of all versions, looked up anew whenever another process has written."""
+        (data_version,) = driver_of(self._connection).execute("PRAGMA data_version").fetchone()
+        if self._extent is None or self._extent[0] != data_version:
+            self._extent = (data_version, self._looked_up_extent())
+        return self._extent[1]
+
+    def _looked_up_extent(self) -> DegreeBox | None:
+        driver = driver_of(self._connection)
+        boxes = [driver.execute(EXTENT_SQL.format(table=source.name)).fetchone() for source in LANDMARK_TABLES]
+        held = [box for box in boxes if box[0] is not None]
+        if not held:
+            return None
+        return DegreeBox(
+            lon_min_deg=min(box[0] for box in held),
+            lat_min_deg=min(box[1] for box in held),
+            lon_max_deg=max(box[2] for box in held),
+            lat_max_deg=max(box[3] for box in held),
+        )
+
+    def _adopt_crs(self, crs: str) -> None:
+        reference = schema.spatial_reference_of(crs)
+        insert_reference(self._connection, reference)
+        driver = driver_of(self._connection)
+        driver.execute("UPDATE gpkg_contents SET srs_id = ? WHERE data_type = 'features'", (reference.srs_id,))
+        driver.execute("UPDATE gpkg_geometry_columns SET srs_id = ?", (reference.srs_id,))
+
+    def _write(self, change: MapChange) -> None:
+        srs_id = schema.spatial_reference_of(change.version.crs).srs_id
+        self._insert(tables.map_versions, [records.plain_record(change.version)])
+        self._close_landmarks(change.closed, change.version.map_version)
+        try:
+            self._insert(tables.landmarks, [records.landmark_record(row, srs_id) for row in change.opened])
+        except IntegrityError as error:
+            raise InputError(f"map version {change.version.map_version}: {error.orig}: it is still valid") from error
+        self._insert(tables.trajectories, [records.trajectory_record(row, srs_id) for row in change.trajectories])
+        self._insert(tables.anchors, [records.anchor_record(row, srs_id) for row in change.anchors])
+        self._insert(tables.image_offsets, [records.plain_record(row) for row in change.image_offsets])
+
+    def _insert(self, target: Table, rows: Sequence[Record]) -> None:
+        if rows:
+            self._connection.execute(insert(target), rows)
+
+    def _close_landmarks(self, landmarks: Sequence[str], map_version: int) -> None:
+        table_columns = tuple(item.name for item in tables.landmarks.columns)
+        names = [name for name in table_columns if name not in ("fid", "valid_to_version")]
+        columns = ", ".join(names)
+        driver = driver_of(self._connection)
+        moved = driver.executemany(
+            f"INSERT INTO landmark_history ({columns}, valid_to_version) "
+            f"SELECT {columns}, ? FROM landmarks WHERE landmark = ?",
+            [(map_version, landmark) for landmark in landmarks],
+        ).rowcount
+        if landmarks and moved != len(landmarks):
+            raise InputError(f"map version {map_version} closes {len(landmarks)} landmarks: {moved} are valid")
+        driver.executemany("DELETE FROM landmarks WHERE landmark = ?", [(landmark,) for landmark in landmarks])
+
+    def _write_checkpoint(self, checkpoint: Checkpoint) -> None:
+        self._connection.execute(delete(tables.checkpoints))
+        self._insert(
+            tables.checkpoints,
+            [{"stream": stream, "next_number": number} for stream, number in checkpoint.next_numbers],
+        )
+
+    def _date_layers(self, solved_ns: int) -> None:
+        """The layers' extents, and the time they changed: the version's own, so that a replay writes the same."""
+        changed = (EPOCH + timedelta(microseconds=solved_ns // 1000)).strftime("%Y-%m-%dT%H:%M:%S.%f")[:-3] + "Z"
+        driver = driver_of(self._connection)
+        driver.execute("UPDATE gpkg_contents SET last_change = ?", (changed,))
+        for layer in schema.FEATURE_LAYERS:
+            index = schema.rtree_name(layer.name.removeprefix("current_"))
+            box = driver.execute(f"SELECT min(minx), min(miny), max(maxx), max(maxy) FROM {index}").fetchone()
+            driver.execute(
+                "UPDATE gpkg_contents SET min_x = ?, min_y = ?, max_x = ?, max_y = ? WHERE table_name = ?",
+                (*box, layer.name),
+            )

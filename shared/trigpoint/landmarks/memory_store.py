@@ -1,0 +1,88 @@
+"""The landmark store in memory: for tests, and for maps nobody keeps."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from trigpoint.errors import InputError
+from trigpoint.landmarks.model import (
+    Anchor,
+    Checkpoint,
+    ImageOffset,
+    Landmark,
+    LandmarkChanges,
+    MapChange,
+    MapRow,
+    MapVersion,
+    Trajectory,
+    valid_at,
+)
+from trigpoint.landmarks.queries import (
+    LandmarkQuery,
+    answered,
+    changes_of,
+    require_known_version,
+    require_next_version,
+)
+
+
+class MemoryStore:
+    """A LandmarkStore that is gone with its process."""
+
+    def __init__(self) -> None:
+        self._versions: tuple[MapVersion, ...] = ()
+        self._valid: dict[str, Landmark] = {}
+        self._ended: tuple[Landmark, ...] = ()
+        self._others: tuple[Trajectory | Anchor | ImageOffset, ...] = ()
+        self._checkpoint = Checkpoint()
+
+    def apply(self, change: MapChange, checkpoint: Checkpoint) -> None:
+        """One map version and its checkpoint; nothing if it is refused."""
+        require_next_version(change.version, self._versions)
+        valid, ended = self._after(change)
+        self._valid, self._ended = valid, self._ended + ended
+        self._versions += (change.version,)
+        self._others += change.trajectories + change.anchors + change.image_offsets
+        self._checkpoint = checkpoint
+
+    def landmarks(self, query: LandmarkQuery) -> tuple[Landmark, ...]:
+        """The landmarks that meet a query."""
+        held: tuple[Landmark, ...] = tuple(self._valid.values())
+        if query.as_of is not None:
+            require_known_version(query.as_of, [version.map_version for version in self._versions])
+            held = tuple(landmark for landmark in held + self._ended if valid_at(landmark, query.as_of))
+        return answered([row for row in held if query.kind in (None, row.kind)], query)
+
+    def changes(self, query: LandmarkQuery, *, since: int) -> LandmarkChanges:
+        """What changed since a version among the landmarks that meet a query."""
+        return changes_of(self, query, since=since)
+
+    def map_versions(self) -> tuple[MapVersion, ...]:
+        """All map versions in order."""
+        return self._versions
+
+    def checkpoint(self) -> Checkpoint:
+        """How far the log has been taken in."""
+        return self._checkpoint
+
+    def rows(self) -> Iterator[MapRow]:
+        """Every row of every version."""
+        yield from self._versions
+        yield from self._valid.values()
+        yield from self._ended
+        yield from self._others
+
+    def close(self) -> None:
+        """Nothing is held open."""
+
+    def _after(self, change: MapChange) -> tuple[dict[str, Landmark], tuple[Landmark, ...]]:
+        map_version = change.version.map_version
+        valid = dict(self._valid)
+        found = [landmark for landmark in change.closed if landmark in valid]
+        if len(found) != len(change.closed):
+            raise InputError(f"map version {map_version} closes {len(change.closed)} landmarks: {len(found)} are valid")
+        ended = tuple(replace(valid.pop(landmark), valid_to_version=map_version) for landmark in found)
+        for landmark in change.opened:
+            if landmark.landmark in valid:
+                raise InputError(f"map version {map_version} opens {landmark.landmark!r}: it is still valid")
+            valid[landmark.landmark] = landmark
+        return valid, ended

@@ -1,0 +1,179 @@
+"""The landmark map's tables: one model for every database, with geometry as the one type that differs."""
+
+from typing import Any
+
+from sqlalchemy import REAL, BigInteger, Boolean, Column, Integer, MetaData, Table, Text, UniqueConstraint
+from sqlalchemy.engine import Dialect
+from sqlalchemy.types import LargeBinary, TypeDecorator, TypeEngine, UserDefinedType
+
+from trigpoint.landmarks.geopackage_geometry import decoded, encoded_line, encoded_point
+
+metadata = MetaData()
+
+# Columns are TEXT, INTEGER and REAL: GDAL skips VARCHAR columns of a GeoPackage and reads FLOAT as 32 bits.
+WholeNumber = BigInteger().with_variant(Integer, "sqlite")
+
+
+class GeometryColumn(UserDefinedType[bytes]):
+    """A column whose SQL type is the geometry's name, as GeoPackage wants it."""
+
+    cache_ok = True
+
+    def __init__(self, geometry_name: str) -> None:
+        self.geometry_name = geometry_name
+
+    def get_col_spec(self, **_: Any) -> str:
+        """The column's SQL type."""
+        return self.geometry_name
+
+
+class LandmarkGeometry(TypeDecorator[tuple[int, tuple[tuple[float, float], ...]]]):
+    """A point ("POINT") or line ("LINESTRING") as (srs id, coordinates): GeoPackage bytes on SQLite.
+
+    A server database gets its own branch in `load_dialect_impl`; the tables below stay as they are.
+    """
+
+    impl = LargeBinary
+    cache_ok = True
+
+    def __init__(self, geometry_name: str) -> None:
+        super().__init__()
+        self.geometry_name = geometry_name
+
+    def load_dialect_impl(self, dialect: Dialect) -> TypeEngine[Any]:
+        """The column type of a database."""
+        if dialect.name != "sqlite":
+            raise NotImplementedError(f"geometry on {dialect.name}: only sqlite is there")
+        return dialect.type_descriptor(GeometryColumn(self.geometry_name))
+
+    def process_bind_param(
+        self, value: tuple[int, tuple[tuple[float, float], ...]] | None, dialect: Dialect
+    ) -> bytes | None:
+        """GeoPackage bytes."""
+        if value is None:
+            return None
+        srs_id, points = value
+        if self.geometry_name == "POINT":
+            return encoded_point(*points[0], srs_id=srs_id)
+        return encoded_line(points, srs_id=srs_id)
+
+    def process_result_value(
+        self, value: bytes | None, dialect: Dialect
+    ) -> tuple[int, tuple[tuple[float, float], ...]] | None:
+        """The srs id and the coordinates."""
+        return None if value is None else (int.from_bytes(value[4:8], "little", signed=True), decoded(value))
+
+
+def _whole(name: str, *, nullable: bool = False) -> Column[int]:
+    return Column(name, WholeNumber, nullable=nullable)
+
+
+def _real(name: str, *, nullable: bool = False) -> Column[float]:
+    return Column(name, REAL, nullable=nullable)
+
+
+def _text(name: str) -> Column[str]:
+    return Column(name, Text, nullable=False)
+
+
+def _feature_id() -> Column[int]:
+    return Column("fid", Integer, primary_key=True)
+
+
+def _covariance() -> tuple[Column[float], ...]:
+    return _real("variance_x_m2"), _real("covariance_xy_m2"), _real("variance_y_m2")
+
+
+def _landmark_table(name: str, *constraints: UniqueConstraint) -> Table:
+    return Table(
+        name,
+        metadata,
+        _feature_id(),
+        Column("geom", LandmarkGeometry("POINT"), nullable=False),
+        *(_text(column) for column in ("landmark", "kind", "signature")),
+        *(_real(column) for column in ("x_m", "y_m", "lat_deg", "lon_deg")),
+        *_covariance(),
+        *(_real(column) for column in ("sigma_major_m", "sigma_minor_m", "ellipse_heading_rad")),
+        _whole("observation_count"),
+        _text("vehicles"),
+        _whole("first_seen_ns"),
+        _whole("last_seen_ns"),
+        Column("anchored", Boolean, nullable=False),
+        _text("anchors"),
+        _text("provenance"),
+        _whole("valid_from_version"),
+        _whole("valid_to_version", nullable=True),
+        *constraints,
+    )
+
+
+# What is valid now stands apart from what was: GIS programs then show the map of today, and its index stays small.
+landmarks = _landmark_table("landmarks", UniqueConstraint("landmark"))
+landmark_history = _landmark_table("landmark_history", UniqueConstraint("landmark", "valid_from_version"))
+
+trajectories = Table(
+    "trajectories",
+    metadata,
+    _feature_id(),
+    Column("geom", LandmarkGeometry("LINESTRING"), nullable=True),
+    _whole("map_version"),
+    _text("vehicle"),
+    _text("boot_id"),
+    _whole("first_stamp_ns"),
+    _whole("last_stamp_ns"),
+    _whole("pose_count"),
+    _real("length_m"),
+    _text("calibration_json"),
+    UniqueConstraint("map_version", "vehicle", "boot_id"),
+)
+
+anchors = Table(
+    "anchors",
+    metadata,
+    _feature_id(),
+    Column("geom", LandmarkGeometry("POINT"), nullable=True),
+    _whole("map_version"),
+    *(_text(column) for column in ("anchor", "image", "kind", "signature", "landmark", "reason")),
+    *(_real(column, nullable=True) for column in ("sigma_m", "residual_x_m", "residual_y_m", "residual_m")),
+    *(_real(column, nullable=True) for column in ("lat_deg", "lon_deg")),
+    UniqueConstraint("map_version", "anchor"),
+)
+
+image_offsets = Table(
+    "image_offsets",
+    metadata,
+    _feature_id(),
+    _whole("map_version"),
+    _text("image"),
+    _real("offset_x_m"),
+    _real("offset_y_m"),
+    *_covariance(),
+    UniqueConstraint("map_version", "image"),
+)
+
+map_versions = Table(
+    "map_versions",
+    metadata,
+    Column("map_version", Integer, primary_key=True),
+    *(_text(column) for column in ("method", "settings_json", "inputs_json")),
+    _whole("landmark_count"),
+    _whole("anchor_count"),
+    _real("wall_s"),
+    _whole("solved_ns"),
+    _text("log_stream"),
+    _whole("log_number"),
+    _text("crs"),
+    _real("origin_easting_m"),
+    _real("origin_northing_m"),
+    _text("operation"),
+    _real("operation_accuracy_m"),
+)
+
+checkpoints = Table(
+    "log_checkpoints",
+    metadata,
+    _feature_id(),
+    _text("stream"),
+    _whole("next_number"),
+    UniqueConstraint("stream"),
+)
