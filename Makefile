@@ -43,6 +43,9 @@ format: $(DEVELOPED) ## code and imports put in order
 figures: $(DEVELOPED) ## every figure measured, one JSON object a line; ONLY=group[,group] for some
 	@PYTHONPATH=tests $(BIN)/python -m figures $(if $(ONLY),--only $(ONLY)) --drives ../shared/data
 
+schemas: $(DEVELOPED) ## the Protobuf modules from the .proto files
+	$(BIN)/python -m trigpoint_schemas.generate
+
 readme: $(DEVELOPED) ## README's data-flow diagram from the table
 	$(BIN)/python -c "from pathlib import Path; from trigpoint.dataflow import text_with_diagram as t; p = Path('README.md'); p.write_text(t(p.read_text()))"
 
