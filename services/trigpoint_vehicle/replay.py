@@ -1,0 +1,161 @@
+"""A recorded drive sent over the bus as its vehicle would have: stored, forwarded, and sent again until it is kept."""
+
+import logging
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+from trigpoint.bus.ports import Bus, BusMessage, Subscription
+from trigpoint.errors import InputError, ServiceError
+from trigpoint.events.codec import encode
+from trigpoint.events.envelope import Envelope, EventIdentity
+from trigpoint.events.keys import DEFAULT_ROOT
+from trigpoint.events.observed import Observed
+from trigpoint.events.uplink import acknowledgement_key, uplink_key_of
+
+LISTENER_POLL_S = 0.002  # how often to look whether ingest is there yet
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplaySettings:
+    """At most `window` messages are under way; all of them are sent again after `ack_timeout_s` without progress,
+    `attempts` times. Ingest has to appear within `listener_timeout_s`.
+    """
+
+    root: str = DEFAULT_ROOT
+    window: int = 4096
+    ack_timeout_s: float = 1.0
+    attempts: int = 10
+    listener_timeout_s: float = 10.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplayReport:
+    """`messages` of the vehicle were all acknowledged; `resent` counts what had to be sent again."""
+
+    vehicle: str
+    messages: int
+    resent: int
+
+
+class _Replay:
+    """One vehicle's messages under way: those sent and not yet acknowledged, oldest first."""
+
+    def __init__(self, bus: Bus, acknowledgements: Subscription, settings: ReplaySettings) -> None:
+        self._bus = bus
+        self._acknowledgements = acknowledgements
+        self._settings = settings
+        self._unacknowledged: deque[BusMessage] = deque()
+        self.sent = 0
+        self.resent = 0
+
+    def send(self, message: BusMessage) -> None:
+        """The message sent, once there is room for it among those under way."""
+        while len(self._unacknowledged) >= self._settings.window:
+            self._await_progress()
+        self._unacknowledged.append(message)
+        self._bus.publish(message)
+        self.sent += 1
+        while acknowledgement := self._acknowledgements.receive(0.0):
+            self._accept(acknowledgement.identity)
+
+    def finish(self) -> None:
+        """Every message is acknowledged."""
+        while self._unacknowledged:
+            self._await_progress()
+
+    def _accept(self, acknowledged: EventIdentity) -> bool:
+        """True if the acknowledgement was about something under way."""
+        under_way = len(self._unacknowledged)
+        while self._unacknowledged and _covers(acknowledged, self._unacknowledged[0].identity):
+            self._unacknowledged.popleft()
+        return len(self._unacknowledged) < under_way
+
+    def _await_progress(self) -> None:
+        for _ in range(self._settings.attempts):
+            if self._progressed():
+                return
+            self._send_again()
+        oldest = self._unacknowledged[0].identity
+        raise ServiceError(
+            f"{oldest}: {len(self._unacknowledged)} messages unacknowledged after {self._settings.attempts} "
+            f"times {self._settings.ack_timeout_s:g} s; what was acknowledged before is kept"
+        )
+
+    def _progressed(self) -> bool:
+        deadline_s = time.monotonic() + self._settings.ack_timeout_s
+        while (left_s := deadline_s - time.monotonic()) > 0.0:
+            acknowledgement = self._acknowledgements.receive(left_s)
+            if acknowledgement is not None and self._accept(acknowledgement.identity):
+                return True
+        return False
+
+    def _send_again(self) -> None:
+        logger.warning("%d messages sent again from %s", len(self._unacknowledged), self._unacknowledged[0].identity)
+        for message in self._unacknowledged:
+            self._bus.publish(message)
+        self.resent += len(self._unacknowledged)
+
+
+def _covers(acknowledged: EventIdentity, sent: EventIdentity) -> bool:
+    return acknowledged.boot_id == sent.boot_id and acknowledged.sequence >= sent.sequence
+
+
+def replay_rows(
+    rows: Iterable[Envelope[Observed]],
+    bus: Bus,
+    *,
+    settings: ReplaySettings | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> ReplayReport:
+    """One vehicle's events sent in order, all of them acknowledged; `progress` hears of each one sent.
+
+    Raises InputError for rows of no vehicle, ServiceError if nobody listens or acknowledges.
+    """
+    chosen = settings if settings is not None else ReplaySettings()
+    messages = _messages(rows, chosen.root)
+    first = next(messages, None)
+    if first is None:
+        raise InputError("no event to replay: at least a VehicleDescribed is needed")
+    vehicle = first.identity.source
+    acknowledgements = bus.subscribe(acknowledgement_key(vehicle, root=chosen.root))
+    try:
+        _await_listener(bus, first.key, chosen.listener_timeout_s)
+        replay = _Replay(bus, acknowledgements, chosen)
+        replay.send(first)
+        for message in messages:
+            replay.send(message)
+            if progress is not None:
+                progress(1)
+        replay.finish()
+    finally:
+        acknowledgements.close()
+    return ReplayReport(vehicle=vehicle, messages=replay.sent, resent=replay.resent)
+
+
+def _messages(rows: Iterable[Envelope[Observed]], root: str) -> Iterator[BusMessage]:
+    keys: dict[type, str] = {}
+    for envelope in rows:
+        schema_name, payload = encode(envelope.event)
+        kind = type(envelope.event)
+        key = keys.get(kind)
+        if key is None:
+            key = keys[kind] = uplink_key_of(envelope, root=root)
+        yield BusMessage(
+            key=key,
+            schema_name=schema_name,
+            payload=payload,
+            identity=envelope.identity,
+            stamp_ns=envelope.stamp_ns,
+        )
+
+
+def _await_listener(bus: Bus, key: str, timeout_s: float) -> None:
+    deadline_s = time.monotonic() + timeout_s
+    while not bus.has_listener(key):
+        if time.monotonic() > deadline_s:
+            raise ServiceError(f"nobody listens to {key} after {timeout_s:g} s: is ingest running?")
+        time.sleep(LISTENER_POLL_S)
