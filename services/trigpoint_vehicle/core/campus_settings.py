@@ -47,6 +47,7 @@ class RouteSettings:
     turn_max_rad: float = 1.8  # no sharper turn at a junction
     coverage_min: float = 0.70  # share of all streets' length that one loop drives on
     shared_min: float = 0.60  # streets two loops share, over the streets either drives on
+    shared_max: float = 0.85  # and no more, so that each adds landmarks of its own
     revisited_min: float = 0.08  # share of a loop driven on streets already driven
     straight_length_m: float = 1000.0
     standing_s: float = 120.0

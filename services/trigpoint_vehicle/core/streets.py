@@ -1,5 +1,8 @@
 """The campus's streets and closed routes through them."""
 
+import bisect
+import itertools
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,7 +61,7 @@ APART = (
     ("west-south", "west", "middle-west", "south-west"),
     ("east-south", "east", "middle-east", "south-east"),
 )
-ROUTE_ATTEMPTS = 3000
+ROUTE_ATTEMPTS = 1200
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,53 +93,62 @@ def quadrangle_box_m(streets: Streets, margin_m: float) -> tuple[Floats, Floats]
     return ring.min(axis=0) - margin_m, ring.max(axis=0) + margin_m
 
 
-def _neighbours(streets: Streets) -> dict[int, list[tuple[int, int]]]:
-    reached: dict[int, list[tuple[int, int]]] = {}
-    for number, (a, b) in enumerate(streets.street.tolist()):
-        reached.setdefault(a, []).append((b, number))
-        reached.setdefault(b, []).append((a, number))
-    return reached
-
-
 @dataclass(frozen=True, slots=True)
 class _Walk:
     junctions: Route
     streets: tuple[int, ...]
 
 
-def _turn_rad(streets: Streets, junctions: list[int], ahead: int) -> float:
-    if len(junctions) < 2:
-        return 0.0
-    before, here, after = streets.junction_m[[*junctions[-2:], ahead]]
+@dataclass(frozen=True, slots=True)
+class _Ways:
+    """`onward[(before, here)]` lists (junction, street) that may follow; `before` is -1 at the start."""
+
+    onward: dict[tuple[int, int], list[tuple[int, int]]]
+    length_m: tuple[float, ...]
+
+
+def _turn_rad(before: Floats, here: Floats, after: Floats) -> float:
     angle = np.arctan2(*(after - here)[::-1]) - np.arctan2(*(here - before)[::-1])
     return abs(wrap_angle_rad(float(angle)))
 
 
-def _random_walk(streets: Streets, settings: RouteSettings, start: int, rng: np.random.Generator) -> _Walk | None:
-    reached = _neighbours(streets)
-    here, length_m = start, 0.0
+def _ways(streets: Streets, turn_max_rad: float) -> _Ways:
+    both = [(a, b, number) for number, (a, b) in enumerate(streets.street.tolist())]
+    both += [(b, a, number) for a, b, number in both]
+    onward: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for here, after, number in both:
+        onward.setdefault((-1, here), []).append((after, number))
+        for before in {a for a, b, _ in both if b == here}:
+            corner = streets.junction_m[[before, here, after]]
+            if before != after and _turn_rad(*corner) <= turn_max_rad:
+                onward.setdefault((before, here), []).append((after, number))
+    return _Ways(onward, tuple(streets.length_m.tolist()))
+
+
+def _random_walk(ways: _Ways, settings: RouteSettings, start: int, rng: np.random.Generator) -> _Walk | None:
+    before, here, length_m = -1, start, 0.0
     junctions, driven = [start], list[int]()
-    while length_m < settings.length_max_m:
-        ways = [way for way in reached[here] if _turn_rad(streets, junctions, way[0]) <= settings.turn_max_rad]
-        if not ways:
-            return None
-        weight = np.array([1.0 / (1.0 + 3.0 * driven.count(number)) for _, number in ways])
-        here, number = ways[int(rng.choice(len(ways), p=weight / weight.sum()))]
+    while length_m < settings.length_max_m and (before, here) in ways.onward:
+        choices = ways.onward[before, here]
+        reach = list(itertools.accumulate(1.0 / (1.0 + 3.0 * driven.count(number)) for _, number in choices))
+        before, (here, number) = here, choices[bisect.bisect(reach, rng.random() * reach[-1])]
         junctions.append(here)
         driven.append(number)
-        length_m += float(streets.length_m[number])
+        length_m += ways.length_m[number]
         if here == start and settings.length_min_m <= length_m <= settings.length_max_m:
             return _Walk(tuple(junctions), tuple(driven))
     return None
 
 
-def _shares(streets: Streets, walk: _Walk, others: list[_Walk]) -> Floats:
-    # coverage of all streets, least share with any other walk, revisited share of the walk
+def _lack(streets: Streets, settings: RouteSettings, walk: _Walk, others: list[_Walk]) -> float:
+    # by how much, in shares of length, a walk misses what is wanted of it
     length_m, mine = streets.length_m, set(walk.streets)
-    own_m = sum(float(length_m[number]) for number in mine)
-    walked_m = sum(float(length_m[number]) for number in walk.streets)
+    own_m = float(length_m[sorted(mine)].sum())
+    revisited = 1.0 - own_m / float(length_m[list(walk.streets)].sum())
     shared = [_overlap(length_m, mine, set(other.streets)) for other in others]
-    return np.array([own_m / float(length_m.sum()), min(shared, default=1.0), 1.0 - own_m / walked_m])
+    misses = [settings.coverage_min - own_m / float(length_m.sum()), settings.revisited_min - revisited]
+    misses += [settings.shared_min - share for share in shared] + [share - settings.shared_max for share in shared]
+    return sum(max(miss, 0.0) for miss in misses)
 
 
 def _overlap(length_m: Floats, mine: set[int], theirs: set[int]) -> float:
@@ -144,13 +156,13 @@ def _overlap(length_m: Floats, mine: set[int], theirs: set[int]) -> float:
 
 
 def _loop(streets: Streets, settings: RouteSettings, others: list[_Walk], rng: np.random.Generator) -> _Walk:
-    wanted = np.array([settings.coverage_min, settings.shared_min, settings.revisited_min])
-    best, best_lack = None, np.inf
+    ways, ring = _ways(streets, settings.turn_max_rad), set(np.flatnonzero(streets.in_quadrangle).tolist())
+    best, best_lack = None, math.inf
     for _ in range(ROUTE_ATTEMPTS):
-        walk = _random_walk(streets, settings, int(rng.integers(len(streets.junction_m))), rng)
-        if walk is None or not set(np.flatnonzero(streets.in_quadrangle)) <= set(walk.streets):
+        walk = _random_walk(ways, settings, int(rng.integers(len(streets.junction_m))), rng)
+        if walk is None or not ring <= set(walk.streets):
             continue
-        lack = float(np.maximum(wanted - _shares(streets, walk, others), 0.0).sum())
+        lack = _lack(streets, settings, walk, others)
         if lack < best_lack:
             best, best_lack = walk, lack
         if lack == 0.0:
