@@ -1,0 +1,119 @@
+"""How an event's identity is kept in MCAP without touching its payload, so that any MCAP tool decodes it.
+
+One channel for each (topic, schema, source, boot): source, boot and vehicle are the channel's metadata, and
+the message's own `sequence` is the event's. MCAP gives it 32 bits; the higher ones are `sequence_base` in the
+channel's metadata, so a boot with more events than that goes on in another channel. Both times of a message
+are the time of measurement: nothing in a file depends on when it was written. An event's number in its stream
+is the file's first number plus the messages before it.
+"""
+
+from dataclasses import dataclass
+
+from google.protobuf.descriptor import FileDescriptor
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from mcap.records import Channel
+
+from trigpoint.errors import InputError
+from trigpoint.events.codec import Event, encode, message_class
+from trigpoint.events.envelope import Envelope, EventIdentity
+from trigpoint.events.keys import DEFAULT_MAP, KEY_PATTERNS, valid_name, vehicle_of
+
+SEQUENCE_SPAN = 2**32  # MCAP's Message.sequence is a uint32
+STAMP_LIMIT_NS = 2**63  # the catalog's integers are signed
+ENCODING = "protobuf"
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelKey:
+    """What all messages of one channel share. `vehicle` is empty where events are about none."""
+
+    topic: str
+    schema_name: str
+    source: str
+    boot_id: str
+    vehicle: str = ""
+    sequence_base: int = 0
+
+    def identity(self, mcap_sequence: int) -> EventIdentity:
+        """The identity of the channel's message with this MCAP sequence."""
+        return EventIdentity(self.source, self.boot_id, self.sequence_base + mcap_sequence)
+
+
+@dataclass(frozen=True, slots=True)
+class PackedRow:
+    """An event ready to be written."""
+
+    channel: ChannelKey
+    mcap_sequence: int
+    stamp_ns: int
+    payload: bytes
+
+
+def packed(envelope: Envelope[Event]) -> PackedRow:
+    """The event as it is written. Raises InputError for a stamp or sequence no log can hold."""
+    identity, stamp_ns = envelope.identity, envelope.stamp_ns
+    if not 0 <= stamp_ns < STAMP_LIMIT_NS:
+        raise InputError(f"{identity}: stamp {stamp_ns} ns is outside [0, {STAMP_LIMIT_NS})")
+    if not 0 <= identity.sequence < STAMP_LIMIT_NS:
+        raise InputError(f"{identity}: sequence {identity.sequence} is outside [0, {STAMP_LIMIT_NS})")
+    schema_name, payload = encode(envelope.event)
+    mcap_sequence = identity.sequence % SEQUENCE_SPAN
+    pattern = KEY_PATTERNS[type(envelope.event)]
+    vehicle = valid_name(vehicle_of(envelope)) if "{vehicle}" in pattern else ""
+    channel = ChannelKey(
+        topic=_topic(pattern, vehicle),
+        schema_name=schema_name,
+        source=identity.source,
+        boot_id=identity.boot_id,
+        vehicle=vehicle,
+        sequence_base=identity.sequence - mcap_sequence,
+    )
+    return PackedRow(channel, mcap_sequence, stamp_ns, payload)
+
+
+def _topic(pattern: str, vehicle: str) -> str:
+    """The key's pattern filled in; a landmark's without its tile."""
+    return pattern.partition("/{zoom}")[0].format(vehicle=vehicle, map=DEFAULT_MAP)
+
+
+def channel_record(key: ChannelKey, *, channel_id: int, schema_id: int) -> Channel:
+    """The MCAP channel of a key."""
+    metadata = {"source": key.source, "boot_id": key.boot_id}
+    if key.vehicle:
+        metadata["vehicle"] = key.vehicle
+    if key.sequence_base:
+        metadata["sequence_base"] = str(key.sequence_base)
+    return Channel(id=channel_id, topic=key.topic, message_encoding=ENCODING, metadata=metadata, schema_id=schema_id)
+
+
+def channel_key(channel: Channel, *, schema_name: str) -> ChannelKey:
+    """The key of an MCAP channel, also of a foreign one: source and boot are empty where it names none.
+
+    Raises ValueError for a sequence base that is no number.
+    """
+    metadata = channel.metadata
+    return ChannelKey(
+        topic=channel.topic,
+        schema_name=schema_name,
+        source=metadata.get("source", ""),
+        boot_id=metadata.get("boot_id", ""),
+        vehicle=metadata.get("vehicle", ""),
+        sequence_base=int(metadata.get("sequence_base", "0")),
+    )
+
+
+def schema_data(schema_name: str) -> bytes:
+    """The Protobuf FileDescriptorSet of a known schema with all it imports, dependencies first."""
+    descriptors = FileDescriptorSet()
+    file: FileDescriptor = message_class(schema_name).DESCRIPTOR.file  # type: ignore[assignment]  # its C twin
+    _add_file(descriptors, file, set())
+    return descriptors.SerializeToString(deterministic=True)
+
+
+def _add_file(descriptors: FileDescriptorSet, file: FileDescriptor, added: set[str]) -> None:
+    if file.name in added:
+        return
+    added.add(file.name)
+    for imported in file.dependencies:
+        _add_file(descriptors, imported, added)
+    file.CopyToProto(descriptors.file.add())

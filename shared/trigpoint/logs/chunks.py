@@ -1,0 +1,159 @@
+"""The inside of MCAP chunks: packed, compressed and checked."""
+
+import struct
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from typing import NamedTuple, Protocol, TypeVar
+
+import zstandard
+from mcap.data_stream import ReadDataStream, RecordBuilder
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, McapRecord, MessageIndex, Schema
+from mcap.stream_reader import get_chunk_data_stream
+
+from trigpoint.errors import LogDamaged
+from trigpoint.logs.channels import PackedRow
+
+RecordT = TypeVar("RecordT", covariant=True)
+FRAME = struct.Struct("<BQ")  # opcode and length of any record
+MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
+MESSAGE_FIXED_BYTES = MESSAGE.size - FRAME.size
+COMPRESSION = "zstd"
+COMPRESSION_LEVEL = 3  # zstd's own default: the ratio hardly grows above it on packed doubles
+
+
+class ChunkMessage(NamedTuple):
+    """One message of a chunk; `offset` counts bytes from the start of the uncompressed records.
+
+    A named tuple because hundreds of thousands are made in one replay.
+    """
+
+    channel_id: int
+    mcap_sequence: int
+    log_time_ns: int
+    payload: bytes
+    offset: int
+
+
+@dataclass(frozen=True, slots=True)
+class PackedChunk:
+    """A chunk record and the message index records that follow it, with what a file's index says of it."""
+
+    record: Chunk
+    index_by_channel: Mapping[int, MessageIndex]
+    count: int
+
+
+class Readable(Protocol[RecordT]):
+    """A kind of MCAP record."""
+
+    def read(self, stream: ReadDataStream) -> RecordT:
+        """The record of this kind that the stream holds."""
+
+
+def parsed(kind: Readable[RecordT], body: bytes) -> RecordT:
+    """The record of this kind that the bytes hold. Raises LogDamaged if they hold none."""
+    try:
+        return kind.read(ReadDataStream(BytesIO(body)))
+    except (McapError, struct.error, UnicodeDecodeError) as error:
+        raise LogDamaged(f"record of {len(body)} bytes cannot be read: {error or type(error).__name__}") from error
+
+
+def record_bytes(record: McapRecord) -> bytes:
+    """The record as it stands in a file."""
+    builder = RecordBuilder()
+    record.write(builder)
+    return built(builder)
+
+
+def built(builder: RecordBuilder) -> bytes:
+    """The bytes of all records a builder took."""
+    data: bytes = builder.end()  # type: ignore[no-untyped-call]  # mcap leaves it without types
+    return data
+
+
+def pack(rows: Sequence[PackedRow], channel_ids: Sequence[int], definitions: bytes) -> PackedChunk:
+    """A chunk of at least one row, each in the channel beside it; `definitions` are the records before them."""
+    parts, offset = [definitions], len(definitions)
+    entries: dict[int, list[tuple[int, int]]] = {}
+    for row, channel_id in zip(rows, channel_ids, strict=True):
+        length = MESSAGE_FIXED_BYTES + len(row.payload)
+        stamp_ns = row.stamp_ns
+        parts.append(MESSAGE.pack(Opcode.MESSAGE, length, channel_id, row.mcap_sequence, stamp_ns, stamp_ns))
+        parts.append(row.payload)
+        entries.setdefault(channel_id, []).append((stamp_ns, offset))
+        offset += FRAME.size + length
+    data = b"".join(parts)
+    return PackedChunk(_chunk(data, [row.stamp_ns for row in rows]), _indexes(entries), len(rows))
+
+
+def _indexes(entries: Mapping[int, list[tuple[int, int]]]) -> dict[int, MessageIndex]:
+    """A channel's entries sorted by time, as readers want them."""
+    return {channel_id: MessageIndex(channel_id, sorted(entries[channel_id])) for channel_id in sorted(entries)}
+
+
+def _chunk(data: bytes, stamps_ns: Sequence[int]) -> Chunk:
+    return Chunk(
+        compression=COMPRESSION,
+        data=zstandard.compress(data, COMPRESSION_LEVEL),
+        message_start_time=min(stamps_ns),
+        message_end_time=max(stamps_ns),
+        uncompressed_crc=zlib.crc32(data),
+        uncompressed_size=len(data),
+    )
+
+
+def unpacked(chunk: Chunk) -> bytes:
+    """The chunk's records, checked. Raises LogDamaged for a wrong checksum or size."""
+    try:
+        stream, size = get_chunk_data_stream(chunk, validate_crc=False)
+        data: bytes = stream.read(size)
+    except (McapError, zstandard.ZstdError, RuntimeError, EOFError) as error:
+        raise LogDamaged(f"chunk of {len(chunk.data)} bytes does not decompress: {error}") from error
+    if size != chunk.uncompressed_size:
+        raise LogDamaged(f"chunk holds {size} bytes, its header says {chunk.uncompressed_size}")
+    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+        raise LogDamaged(f"chunk has checksum {zlib.crc32(data):08x}, its header says {chunk.uncompressed_crc:08x}")
+    return data
+
+
+def messages(data: bytes) -> Iterator[ChunkMessage]:
+    """The messages among a chunk's records, in order. Raises LogDamaged if the records do not fill it exactly."""
+    offset, end = 0, len(data)
+    unpack, fixed, frame = MESSAGE.unpack_from, MESSAGE.size, FRAME.size
+    while offset < end:
+        opcode, length = FRAME.unpack_from(data, offset) if end - offset >= frame else (0, end)
+        following = offset + frame + length
+        if following > end:
+            raise LogDamaged(f"record of {length} bytes at {offset} reaches past the chunk's end at {end}")
+        if opcode == Opcode.MESSAGE:
+            if length < MESSAGE_FIXED_BYTES:
+                raise LogDamaged(f"message of {length} bytes at {offset}, at least {MESSAGE_FIXED_BYTES} expected")
+            _, _, channel_id, sequence, log_time_ns, _ = unpack(data, offset)
+            yield ChunkMessage(channel_id, sequence, log_time_ns, data[offset + fixed : following], offset)
+        offset = following
+
+
+def definitions(data: bytes) -> tuple[tuple[Schema, ...], tuple[Channel, ...]]:
+    """The schemas and channels among a chunk's records. Raises LogDamaged for one that cannot be read."""
+    schemas, channels = [], []
+    offset = 0
+    while offset + FRAME.size <= len(data):
+        opcode, length = FRAME.unpack_from(data, offset)
+        if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            body = data[offset + FRAME.size : offset + FRAME.size + length]
+            schemas += [parsed(Schema, body)] if opcode == Opcode.SCHEMA else []
+            channels += [parsed(Channel, body)] if opcode == Opcode.CHANNEL else []
+        offset += FRAME.size + length
+    return tuple(schemas), tuple(channels)
+
+
+def message_indexes(data: bytes) -> dict[int, MessageIndex]:
+    """The message index of each channel in a chunk, made anew from its records."""
+    entries: dict[int, list[tuple[int, int]]] = {}
+    for message in messages(data):
+        entries.setdefault(message.channel_id, []).append((message.log_time_ns, message.offset))
+    return _indexes(entries)

@@ -1,0 +1,226 @@
+"""Reads an MCAP file in its own order, damaged or not: what is whole comes out, what is not is named.
+
+A wrong checksum loses its chunk only. Where a record's length makes no sense the next compressed chunk that
+checks is looked for. Channels come from the summary, if that is whole, and from the chunks otherwise.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, DataEnd, Footer, MessageIndex, Metadata, MetadataIndex, Schema
+from mcap.writer import MCAP0_MAGIC
+
+from trigpoint.errors import LogDamaged
+from trigpoint.logs.channels import ChannelKey, channel_key
+from trigpoint.logs.chunks import FRAME, definitions, messages, parsed, unpacked
+from trigpoint.logs.file_bytes import FileBytes
+
+MAGIC = bytes(MCAP0_MAGIC)
+FOOTER_BYTES = FRAME.size + 8 + 8 + 4
+DATA_END_BYTES = FRAME.size + 4
+CHUNK_HEAD_BYTES = FRAME.size + 8 + 8 + 8 + 4  # up to the name of the compression
+COMPRESSION_NAMES = (b"\x04\x00\x00\x00zstd", b"\x03\x00\x00\x00lz4")
+KNOWN_OPCODES = frozenset(int(opcode) for opcode in Opcode)
+PRIVATE_OPCODES = 0x80  # this and above: an application's own, to be skipped
+UNKNOWN = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Damage:
+    """Something in a file that is not as it was written: where, in bytes, what, and how many messages it cost.
+
+    `lost_messages` is -1 where nothing left in the file tells their number.
+    """
+
+    path: Path
+    offset: int
+    reason: str
+    lost_messages: int = UNKNOWN
+
+    def __str__(self) -> str:
+        lost = "an unknown number of" if self.lost_messages == UNKNOWN else str(self.lost_messages)
+        return f"{self.path}, byte {self.offset}: {self.reason}; {lost} messages lost"
+
+
+@dataclass(frozen=True, slots=True)
+class ScannedChunk:
+    """A whole chunk: where it stands, in bytes, and its records, uncompressed and checked."""
+
+    offset: int
+    length: int
+    start_ns: int
+    end_ns: int
+    data: bytes
+
+
+class McapScan:
+    """One pass over a file; `chunks` has to be exhausted before the rest is true."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.channels: dict[int, ChannelKey] = {}
+        self.channel_records: dict[int, Channel] = {}
+        self.schemas: dict[int, Schema] = {}
+        self.metadata: dict[str, Mapping[str, str]] = {}
+        self.metadata_indexes: list[MetadataIndex] = []
+        self.damages: list[Damage] = []
+        self.finished = False  # the data section has its end
+        self.whole_end = 0  # where the last whole chunk ends, in bytes
+        self._summary_fault = "no summary was read"
+        self._channels_settled = False  # by the summary
+        self._lost_chunk = False  # the last chunk was damaged: its message indexes tell its count
+
+    @property
+    def torn_tail(self) -> bool:
+        """The file was being written when its writer stopped, and nothing before its last whole chunk is damaged."""
+        return not self.finished and all(damage.offset >= self.whole_end for damage in self.damages)
+
+    def chunks(self) -> Iterator[ScannedChunk]:
+        """Every whole chunk, in the order of the file. A message outside of chunks counts as its own."""
+        with FileBytes(self.path) as content:
+            self._summary_fault = self._read_summary(content)
+            offset = self._start(content)
+            while not self.finished and offset < content.size_bytes:
+                following = self._following(content, offset)
+                if following > offset:
+                    yield from self._record(content, offset, following)
+                offset = following if following > offset else self._next_chunk(content, offset + 1)
+            if not self.finished:
+                self._damaged(content.size_bytes, "file ends without the end of its data section", lost=0)
+
+    def _start(self, content: FileBytes) -> int:
+        head = content.read(0, len(MAGIC))
+        if head != MAGIC:
+            self._damaged(0, f"file of {content.size_bytes} bytes starts with {head!r}, expected {MAGIC!r}", lost=0)
+        return len(MAGIC)
+
+    def _following(self, content: FileBytes, offset: int) -> int:
+        """The end of the record at `offset`; `offset` itself, and the damage noted, if there is no such record."""
+        head = content.read(offset, offset + FRAME.size)
+        if len(head) < FRAME.size:
+            self._damaged(offset, f"{len(head)} bytes at the end, a record has at least {FRAME.size}")
+            return offset
+        opcode, length = FRAME.unpack(head)
+        following: int = offset + FRAME.size + length
+        if following > content.size_bytes:
+            self._damaged(offset, f"record {opcode} of {length} bytes reaches past the end at {content.size_bytes}")
+            return offset
+        if opcode not in KNOWN_OPCODES and opcode < PRIVATE_OPCODES:
+            self._damaged(offset, f"record of {length} bytes has the unknown opcode {opcode}")
+            return offset
+        return following
+
+    def _record(self, content: FileBytes, offset: int, following: int) -> Iterator[ScannedChunk]:
+        record = content.read(offset, following)
+        opcode = record[0]
+        try:
+            if opcode in (Opcode.CHUNK, Opcode.MESSAGE):
+                self._lost_chunk = False
+                yield self._chunk(record, offset)
+                self.whole_end = following
+            elif opcode == Opcode.DATA_END:
+                self._end_of_data(content, offset, following)
+            else:
+                self._side_record(record, offset)
+        except LogDamaged as error:
+            self._lost_chunk = self._lost_chunk or opcode == Opcode.CHUNK
+            self._damaged(offset, str(error), lost=UNKNOWN if opcode in (Opcode.CHUNK, Opcode.MESSAGE) else 0)
+
+    def _chunk(self, record: bytes, offset: int) -> ScannedChunk:
+        if record[0] == Opcode.MESSAGE:
+            (message,) = messages(record)
+            return ScannedChunk(offset, len(record), message.log_time_ns, message.log_time_ns, record)
+        chunk = parsed(Chunk, record[FRAME.size :])
+        data = unpacked(chunk)
+        stamps_ns = [message.log_time_ns for message in messages(data)]
+        held = min(stamps_ns, default=0), max(stamps_ns, default=0)
+        self._learn(data)
+        if stamps_ns and held != (chunk.message_start_time, chunk.message_end_time):
+            said = f"[{chunk.message_start_time}, {chunk.message_end_time}]"
+            self._damaged(offset, f"chunk's header says times {said} ns, its messages have {list(held)}", lost=0)
+        return ScannedChunk(offset, len(record), *held, data)
+
+    def _side_record(self, record: bytes, offset: int) -> None:
+        opcode, body = record[0], record[FRAME.size :]
+        if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            self._learn(record)
+        elif opcode == Opcode.METADATA:
+            metadata = parsed(Metadata, body)
+            self.metadata[metadata.name] = metadata.metadata
+            self.metadata_indexes.append(MetadataIndex(offset=offset, length=len(record), name=metadata.name))
+        elif opcode == Opcode.MESSAGE_INDEX and self._lost_chunk:
+            self._count_lost(len(parsed(MessageIndex, body).records))
+
+    def _count_lost(self, count: int) -> None:
+        """A message index after a damaged chunk says how many messages of one channel it held."""
+        damage = self.damages[-1]
+        self.damages[-1] = replace(damage, lost_messages=max(damage.lost_messages, 0) + count)
+
+    def _learn(self, records: bytes) -> None:
+        """Schemas and channels taken over, unless the summary has settled them. Raises LogDamaged."""
+        schemas, channels = definitions(records)
+        if self._channels_settled:
+            return
+        self.schemas |= {schema.id: schema for schema in schemas}
+        for channel in channels:
+            schema = self.schemas.get(channel.schema_id)
+            try:
+                self.channels[channel.id] = channel_key(channel, schema_name=schema.name if schema else "")
+            except ValueError as error:
+                raise LogDamaged(f"channel {channel.id} has no number as its sequence base: {error}") from error
+            self.channel_records[channel.id] = channel
+
+    def _next_chunk(self, content: FileBytes, offset: int) -> int:
+        """Where the next chunk that checks starts, or the file's end."""
+        while True:
+            found = (content.find(name, offset + CHUNK_HEAD_BYTES) for name in COMPRESSION_NAMES)
+            start = min((position - CHUNK_HEAD_BYTES for position in found if position >= 0), default=None)
+            if start is None:
+                return content.size_bytes
+            if _is_whole_chunk(content, start):
+                return start
+            offset = start + 1
+
+    def _end_of_data(self, content: FileBytes, offset: int, following: int) -> None:
+        said = parsed(DataEnd, content.read(offset + FRAME.size, following)).data_section_crc
+        held = content.checksum(0, offset)
+        if said not in (0, held) and not self.damages:
+            self._damaged(offset, f"data section has checksum {held:08x}, its end says {said:08x}", lost=0)
+        self.finished = True
+        if self._summary_fault:
+            self._damaged(following, self._summary_fault, lost=0)
+
+    def _read_summary(self, content: FileBytes) -> str:
+        """What is wrong with the summary, "" if nothing; channels as it names them then."""
+        footer_start = content.size_bytes - len(MAGIC) - FOOTER_BYTES
+        tail = content.read(max(footer_start, 0), content.size_bytes)
+        if tail[FOOTER_BYTES:] != MAGIC or FRAME.unpack_from(tail) != (Opcode.FOOTER, FOOTER_BYTES - FRAME.size):
+            return "file does not end with a footer"
+        footer = parsed(Footer, tail[FRAME.size : FOOTER_BYTES])
+        start = footer.summary_start or footer_start
+        held = content.checksum(start, content.size_bytes - len(MAGIC) - 4)
+        if footer.summary_crc not in (0, held):
+            return f"summary has checksum {held:08x}, the footer says {footer.summary_crc:08x}"
+        end_of_data = content.read(start - DATA_END_BYTES, start)
+        if end_of_data[:1] != bytes([Opcode.DATA_END]):
+            return f"summary starts at {start}, no end of a data section stands before it"
+        self._learn(content.read(start, footer_start))
+        self._channels_settled = bool(self.channels)
+        return ""
+
+    def _damaged(self, offset: int, reason: str, *, lost: int = UNKNOWN) -> None:
+        self.damages.append(Damage(self.path, offset, reason, lost))
+
+
+def _is_whole_chunk(content: FileBytes, offset: int) -> bool:
+    head = content.read(offset, offset + FRAME.size)
+    opcode, length = FRAME.unpack(head)
+    if opcode != Opcode.CHUNK or offset + FRAME.size + length > content.size_bytes:
+        return False
+    try:
+        unpacked(parsed(Chunk, content.read(offset + FRAME.size, offset + FRAME.size + length)))
+    except LogDamaged:
+        return False
+    return True

@@ -1,0 +1,219 @@
+"""Writes MCAP files whose bytes depend on what is written and nothing else."""
+
+import struct
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import (
+    Channel,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    McapRecord,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
+from mcap.writer import MCAP0_MAGIC
+
+from trigpoint.logs.channels import ENCODING, ChannelKey, PackedRow, channel_record, schema_data
+from trigpoint.logs.chunks import PackedChunk, built, pack, record_bytes
+
+LIBRARY = "trigpoint"  # without a version: it would change the bytes of the same log
+CHUNK_BYTES = 128 * 1024  # of payload: a time query decompresses little, and zstd still finds its repetitions
+CHANNEL_LIMIT = 65_535  # channel ids are uint16, and 0 is left out
+
+
+class Output(Protocol):
+    """Where bytes go."""
+
+    def write(self, data: bytes, /) -> int | None:
+        """How many of the bytes were taken."""
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenChunk:
+    """Where a chunk stands in its file, in bytes, and what it holds."""
+
+    offset: int
+    length: int
+    count: int
+    start_ns: int
+    end_ns: int
+    channel_ids: tuple[int, ...]
+
+
+@dataclass(slots=True)
+class FileIndex:
+    """What the summary at the end of a file says of it; grows while the file does."""
+
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    chunks: list[ChunkIndex] = field(default_factory=list)
+    metadata: list[MetadataIndex] = field(default_factory=list)
+    count_by_channel: dict[int, int] = field(default_factory=dict)
+
+    def add_chunk(self, packed: PackedChunk, offset: int) -> bytes:
+        """The bytes of a chunk at this offset and of its message indexes, entered into the index."""
+        chunk, tail, index_offsets = record_bytes(packed.record), [], {}
+        position = offset + len(chunk)
+        for channel_id, index in packed.index_by_channel.items():
+            tail.append(record_bytes(index))
+            index_offsets[channel_id] = position
+            position += len(tail[-1])
+            self.count_by_channel[channel_id] = self.count_by_channel.get(channel_id, 0) + len(index.records)
+        self.chunks.append(_chunk_index(packed, offset, len(chunk), index_offsets, position - offset - len(chunk)))
+        return b"".join([chunk, *tail])
+
+    def ending(self, *, offset: int, data_crc: int) -> bytes:
+        """Everything that ends a file whose data section ends at `offset` with this checksum."""
+        data_end = record_bytes(DataEnd(data_section_crc=data_crc))
+        summary_start = offset + len(data_end)
+        summary, groups = b"", b""
+        for opcode, records in self._groups():
+            group = b"".join(record_bytes(record) for record in records)
+            if group:
+                start = summary_start + len(summary)
+                groups += record_bytes(SummaryOffset(group_opcode=opcode, group_start=start, group_length=len(group)))
+            summary += group
+        offsets_start = summary_start + len(summary)
+        footer_head = struct.pack("<BQQQ", Opcode.FOOTER, 8 + 8 + 4, summary_start, offsets_start)
+        checksum = zlib.crc32(summary + groups + footer_head)
+        footer = record_bytes(Footer(summary_start, offsets_start, checksum))
+        return data_end + summary + groups + footer + bytes(MCAP0_MAGIC)
+
+    def _groups(self) -> Iterator[tuple[Opcode, Sequence[McapRecord]]]:
+        yield Opcode.SCHEMA, list(self.schemas.values())
+        yield Opcode.CHANNEL, list(self.channels.values())
+        yield Opcode.STATISTICS, [self._statistics()]
+        yield Opcode.CHUNK_INDEX, self.chunks
+        yield Opcode.METADATA_INDEX, self.metadata
+
+    def _statistics(self) -> Statistics:
+        return Statistics(
+            attachment_count=0,
+            channel_count=len(self.channels),
+            channel_message_counts=dict(sorted(self.count_by_channel.items())),
+            chunk_count=len(self.chunks),
+            message_count=sum(self.count_by_channel.values()),
+            message_end_time=max((chunk.message_end_time for chunk in self.chunks), default=0),
+            message_start_time=min((chunk.message_start_time for chunk in self.chunks), default=0),
+            metadata_count=len(self.metadata),
+            schema_count=len(self.schemas),
+        )
+
+
+def _chunk_index(
+    packed: PackedChunk, offset: int, length: int, index_offsets: dict[int, int], index_length: int
+) -> ChunkIndex:
+    return ChunkIndex(
+        chunk_length=length,
+        chunk_start_offset=offset,
+        compression=packed.record.compression,
+        compressed_size=len(packed.record.data),
+        message_end_time=packed.record.message_end_time,
+        message_index_length=index_length,
+        message_index_offsets=index_offsets,
+        message_start_time=packed.record.message_start_time,
+        uncompressed_size=packed.record.uncompressed_size,
+    )
+
+
+class McapFileWriter:
+    """One MCAP file being written; bytes reach the output with each `append` and with `finish`."""
+
+    def __init__(self, output: Output, *, metadata: Mapping[str, Mapping[str, str]]) -> None:
+        self._output = output
+        self._index = FileIndex()
+        self._data_crc = 0
+        self._channel_ids: dict[ChannelKey, int] = {}
+        self._schema_ids: dict[str, int] = {}
+        self._position = 0
+        self._head = self._opening(metadata)
+
+    @property
+    def size_bytes(self) -> int:
+        """How long the file is by now."""
+        return self._position
+
+    @property
+    def channels(self) -> Mapping[ChannelKey, int]:
+        """The channels in use and their ids."""
+        return self._channel_ids
+
+    def append(self, rows: Sequence[PackedRow]) -> tuple[WrittenChunk, ...]:
+        """The chunks the rows were written in, in order. Raises OSError as the output does."""
+        head, self._head = self._head, b""
+        self._write(head)
+        return tuple(self._append_chunk(group) for group in _groups_of_rows(rows))
+
+    def finish(self) -> None:
+        """The file ended with its summary; nothing can be appended any more."""
+        head, self._head = self._head, b""
+        self._write(head)
+        self._write(self._index.ending(offset=self._position, data_crc=self._data_crc))
+
+    def _opening(self, metadata: Mapping[str, Mapping[str, str]]) -> bytes:
+        head = bytes(MCAP0_MAGIC) + record_bytes(Header(profile="", library=LIBRARY))
+        for name, values in metadata.items():
+            data = record_bytes(Metadata(name=name, metadata=dict(values)))
+            self._index.metadata.append(MetadataIndex(offset=len(head), length=len(data), name=name))
+            head += data
+        return head
+
+    def _append_chunk(self, rows: Sequence[PackedRow]) -> WrittenChunk:
+        builder = RecordBuilder()
+        channel_ids = [self._channel_ids.get(row.channel) or self._add_channel(row.channel, builder) for row in rows]
+        packed, offset = pack(rows, channel_ids, built(builder)), self._position
+        self._write(self._index.add_chunk(packed, offset))
+        return WrittenChunk(
+            offset=offset,
+            length=self._index.chunks[-1].chunk_length,
+            count=packed.count,
+            start_ns=packed.record.message_start_time,
+            end_ns=packed.record.message_end_time,
+            channel_ids=tuple(packed.index_by_channel),
+        )
+
+    def _add_channel(self, key: ChannelKey, builder: RecordBuilder) -> int:
+        schema_id = self._schema_ids.get(key.schema_name) or self._add_schema(key.schema_name, builder)
+        channel_id = len(self._channel_ids) + 1
+        channel = channel_record(key, channel_id=channel_id, schema_id=schema_id)
+        self._channel_ids[key] = channel_id
+        self._index.channels[channel_id] = channel
+        channel.write(builder)
+        return channel_id
+
+    def _add_schema(self, name: str, builder: RecordBuilder) -> int:
+        schema_id = len(self._schema_ids) + 1
+        schema = Schema(id=schema_id, data=schema_data(name), encoding=ENCODING, name=name)
+        self._schema_ids[name] = schema_id
+        self._index.schemas[schema_id] = schema
+        schema.write(builder)
+        return schema_id
+
+    def _write(self, data: bytes) -> None:
+        remaining = memoryview(data)
+        while remaining:
+            remaining = remaining[self._output.write(bytes(remaining)) or 0 :]
+        self._data_crc = zlib.crc32(data, self._data_crc)
+        self._position += len(data)
+
+
+def _groups_of_rows(rows: Sequence[PackedRow]) -> Iterator[Sequence[PackedRow]]:
+    """The rows cut into runs of about CHUNK_BYTES of payload."""
+    start, size = 0, 0
+    for index, row in enumerate(rows):
+        size += len(row.payload)
+        if size >= CHUNK_BYTES:
+            yield rows[start : index + 1]
+            start, size = index + 1, 0
+    if start < len(rows):
+        yield rows[start:]
