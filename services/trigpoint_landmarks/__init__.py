@@ -1,5 +1,6 @@
 """Projects solved map versions into the landmark database, and answers questions about the map.
 
-Reads: MapFramePinned, AnchorLabelled, MapSolved, TrajectorySolved, LandmarkSolved, AnchorAssociated, ImageOffsetSolved
+Reads: AnchorAssociated, AnchorLabelled, ImageOffsetSolved, LandmarkSolved, MapFramePinned, MapSolved,
+TrajectorySolved
 Writes: (nothing)
 """

@@ -1,5 +1,6 @@
 """The landmark map as values: what a map version holds, and what changes from one version to the next."""
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -175,6 +176,20 @@ class LandmarkChanges:
     as_of: int
     changed: tuple[Landmark, ...]
     removed: tuple[str, ...]
+
+
+def provenance_json(observations: Sequence[tuple[str, str, int]]) -> str:
+    """The text a landmark keeps of its observations: (vehicle, boot, sequence of the sweep) each."""
+    by_drive: dict[str, list[int]] = {}
+    for vehicle, boot_id, sequence in observations:
+        by_drive.setdefault(f"{vehicle}/{boot_id}", []).append(sequence)
+    return json.dumps(by_drive, ensure_ascii=False)
+
+
+def observations_of(provenance: str) -> tuple[tuple[str, str, int], ...]:
+    """The observations in a landmark's text, (vehicle, boot, sequence of the sweep) each, grouped by drive."""
+    drives = [(drive.partition("/"), sequences) for drive, sequences in json.loads(provenance).items()]
+    return tuple((vehicle, boot_id, seq) for (vehicle, _, boot_id), sequences in drives for seq in sequences)
 
 
 def valid_at(landmark: Landmark, map_version: int) -> bool:

@@ -1,0 +1,184 @@
+"""A map version's events as rows of the database: positions in grid and WGS84, ellipses, validity."""
+
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trigpoint.events.corrected import AnchorLabelled
+from trigpoint.events.envelope import LogPosition
+from trigpoint.events.mapped import AnchorAssociated, ImageOffsetSolved, LandmarkSolved, TrajectorySolved
+from trigpoint.geodesy.positions import Wgs84Position
+from trigpoint.geodesy.projection import MapFrame, map_from_wgs84, wgs84_from_map_points
+from trigpoint.geodesy.uncertainty import ellipse_of
+from trigpoint.landmarks.model import (
+    Anchor,
+    ImageOffset,
+    Landmark,
+    MapChange,
+    MapVersion,
+    Trajectory,
+    provenance_json,
+)
+from trigpoint_landmarks.core.versions import SolvedVersion
+
+Floats = NDArray[np.float64]
+Labels = Mapping[str, AnchorLabelled]
+
+
+def labels_within(
+    labelled: Iterable[tuple[LogPosition, AnchorLabelled]], inputs: Sequence[tuple[str, int]]
+) -> dict[str, AnchorLabelled]:
+    """The last label of each anchor among a version's inputs (stream, count): what its solve could know.
+
+    A label added or mended later says nothing about an earlier version, however late that is projected.
+    """
+    counts = dict(inputs)
+    return {label.anchor: label for position, label in labelled if position.number < counts.get(position.stream, 0)}
+
+
+def map_change(version: SolvedVersion, *, frame: MapFrame, labels: Labels, valid: Mapping[str, Landmark]) -> MapChange:
+    """What a version changes in a map whose valid landmarks are `valid`, by id.
+
+    A landmark solved exactly as before keeps its row; any other is closed, and opened anew if it is still there.
+    """
+    solved = {row.landmark: row for row in landmark_rows(version.landmarks, frame)}
+    kept = {name for name, row in solved.items() if name in valid and _is_same(valid[name], row)}
+    return MapChange(
+        version=_version_row(version, frame),
+        opened=tuple(row for name, row in solved.items() if name not in kept),
+        closed=tuple(name for name in valid if name not in kept),
+        trajectories=tuple(_trajectory_row(row, frame) for row in version.trajectories),
+        anchors=tuple(_anchor_row(row, labels.get(row.anchor), frame) for row in version.anchors),
+        image_offsets=tuple(_offset_row(row) for row in version.image_offsets),
+    )
+
+
+def valid_after(valid: Mapping[str, Landmark], change: MapChange) -> dict[str, Landmark]:
+    """The valid landmarks, by id, once a change is made."""
+    closed = frozenset(change.closed)
+    left = {name: row for name, row in valid.items() if name not in closed}
+    return left | {row.landmark: row for row in change.opened}
+
+
+def landmark_rows(landmarks: Sequence[LandmarkSolved], frame: MapFrame) -> list[Landmark]:
+    """The landmarks as rows valid from their version on."""
+    if not landmarks:
+        return []
+    points_m = np.array([row.position_m for row in landmarks], dtype=np.float64).reshape(-1, 2)
+    lat_deg, lon_deg = wgs84_from_map_points(points_m, frame)
+    placed = zip(landmarks, points_m.tolist(), lat_deg.tolist(), lon_deg.tolist(), strict=True)
+    return [_landmark_row(row, point, Wgs84Position(lat, lon), frame) for row, point, lat, lon in placed]
+
+
+def _is_same(held: Landmark, solved: Landmark) -> bool:
+    return replace(solved, valid_from_version=held.valid_from_version) == held
+
+
+def _landmark_row(row: LandmarkSolved, point_m: list[float], wgs84: Wgs84Position, frame: MapFrame) -> Landmark:
+    ellipse = ellipse_of(row.covariance_m2)
+    x_m, y_m = point_m
+    return Landmark(
+        landmark=row.landmark,
+        kind=row.kind,
+        signature=row.signature,
+        x_m=x_m,
+        y_m=y_m,
+        easting_m=x_m + frame.origin_easting_m,
+        northing_m=y_m + frame.origin_northing_m,
+        lat_deg=wgs84.lat_deg,
+        lon_deg=wgs84.lon_deg,
+        variance_x_m2=float(row.covariance_m2[0, 0]),
+        covariance_xy_m2=float(row.covariance_m2[0, 1]),
+        variance_y_m2=float(row.covariance_m2[1, 1]),
+        sigma_major_m=ellipse.semi_major_m,
+        sigma_minor_m=ellipse.semi_minor_m,
+        ellipse_heading_rad=ellipse.heading_rad,
+        observation_count=row.observation_count,
+        vehicles=row.vehicles,
+        first_seen_ns=row.first_seen_ns,
+        last_seen_ns=row.last_seen_ns,
+        anchored=bool(row.anchors),
+        anchors=row.anchors,
+        provenance=provenance_json(row.observations),
+        valid_from_version=row.map_version,
+        valid_to_version=None,
+    )
+
+
+def _version_row(version: SolvedVersion, frame: MapFrame) -> MapVersion:
+    solved = version.solved
+    return MapVersion(
+        map_version=solved.map_version,
+        method=solved.method,
+        settings_json=solved.settings_json,
+        inputs_json=json.dumps(solved.inputs),
+        landmark_count=solved.landmark_count,
+        anchor_count=solved.anchor_count,
+        wall_s=solved.wall_s,
+        solved_ns=version.stamp_ns,
+        log_stream=version.position.stream,
+        log_number=version.position.number,
+        crs=frame.crs,
+        origin_easting_m=frame.origin_easting_m,
+        origin_northing_m=frame.origin_northing_m,
+        operation=frame.operation,
+        operation_accuracy_m=frame.operation_accuracy_m,
+    )
+
+
+def _trajectory_row(row: TrajectorySolved, frame: MapFrame) -> Trajectory:
+    points_m = np.asarray(row.pose, dtype=np.float64).reshape(-1, 3)[:, :2]
+    grid_m = points_m + np.array([frame.origin_easting_m, frame.origin_northing_m])
+    return Trajectory(
+        map_version=row.map_version,
+        vehicle=row.vehicle,
+        boot_id=row.boot_id,
+        first_stamp_ns=int(row.stamp_ns[0]) if len(row.stamp_ns) else 0,
+        last_stamp_ns=int(row.stamp_ns[-1]) if len(row.stamp_ns) else 0,
+        pose_count=len(points_m),
+        length_m=float(np.hypot(*np.diff(points_m, axis=0).T).sum()),
+        calibration_json=json.dumps([(name, _finite(value), _finite(sigma)) for name, value, sigma in row.calibration]),
+        path=tuple((easting_m, northing_m) for easting_m, northing_m in grid_m.tolist()),
+    )
+
+
+def _anchor_row(row: AnchorAssociated, label: AnchorLabelled | None, frame: MapFrame) -> Anchor:
+    x_m, y_m = float(row.residual_m[0]), float(row.residual_m[1])
+    placed = None if label is None else map_from_wgs84(Wgs84Position(label.lat_deg, label.lon_deg), frame)
+    return Anchor(
+        map_version=row.map_version,
+        anchor=row.anchor,
+        image=label.image if label else "",
+        kind=label.kind if label else "",
+        signature=label.signature if label else "",
+        landmark=row.landmark,
+        reason=row.reason,
+        sigma_m=_finite(label.sigma_m) if label else None,
+        residual_x_m=_finite(x_m),
+        residual_y_m=_finite(y_m),
+        residual_m=_finite(math.hypot(x_m, y_m)),
+        lat_deg=label.lat_deg if label else None,
+        lon_deg=label.lon_deg if label else None,
+        easting_m=placed.x_m + frame.origin_easting_m if placed else None,
+        northing_m=placed.y_m + frame.origin_northing_m if placed else None,
+    )
+
+
+def _offset_row(row: ImageOffsetSolved) -> ImageOffset:
+    return ImageOffset(
+        map_version=row.map_version,
+        image=row.image,
+        offset_x_m=float(row.offset_m[0]),
+        offset_y_m=float(row.offset_m[1]),
+        variance_x_m2=float(row.covariance_m2[0, 0]),
+        covariance_xy_m2=float(row.covariance_m2[0, 1]),
+        variance_y_m2=float(row.covariance_m2[1, 1]),
+    )
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
