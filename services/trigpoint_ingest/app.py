@@ -11,7 +11,6 @@ from trigpoint.errors import InputError
 from trigpoint.events.envelope import EventIdentity
 from trigpoint.events.uplink import ACKNOWLEDGEMENT_SCHEMA, acknowledgement_key, uplink_expression
 from trigpoint.logs.ports import EventLog
-from trigpoint_ingest.core.messages import RawMessage
 from trigpoint_ingest.core.ordering import SequenceOrder
 from trigpoint_ingest.core.tally import IngestReport
 from trigpoint_ingest.core.validation import Drive, drive_of
@@ -49,19 +48,19 @@ class IngestService:
         """One message taken, or none within the timeout (then False); what is due is flushed."""
         message = self._subscription.receive(timeout_s)
         if message is not None:
-            self._take(RawMessage(message.schema_name, message.payload, message.identity, message.stamp_ns))
+            self._take(message)
         waited_s = time.monotonic() - self._flushed_s
         if self._journal.pending_count >= self._settings.batch_count or waited_s >= self._settings.batch_s:
             self.flush()
         return message is not None
 
-    def _take(self, raw: RawMessage) -> None:
-        drive = drive_of(raw.identity)
+    def _take(self, message: BusMessage) -> None:
+        drive = drive_of(message.identity)
         order = self._orders.get(drive)
         if order is None:
             following = self._journal.admission.acknowledged(drive) + 1
             order = self._orders[drive] = SequenceOrder(next_sequence=following, capacity=self._settings.held_limit)
-        for released in order.offer(raw):
+        for released in order.offer(message):
             self._journal.take(released)
         if order.held:
             self._gap_since_s.setdefault(drive, time.monotonic())

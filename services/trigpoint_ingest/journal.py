@@ -45,7 +45,7 @@ class Journal:
         try:
             envelope = self.admission.admit(message)
         except EventRejected as error:
-            self._refuse(message, error)
+            self.refuse(message, error)
             return
         if envelope is None:
             self.tally.duplicates[vehicle] += 1
@@ -69,7 +69,8 @@ class Journal:
             self._frame_pinned = True
             self._add(MAP_STREAM, Envelope(FRAME_IDENTITY, stamp_ns, pinned))
 
-    def _refuse(self, message: RawMessage, error: EventRejected) -> None:
+    def refuse(self, message: RawMessage, error: EventRejected) -> None:
+        """The message counted by its reason, and kept if it was not refused before."""
         self.tally.refused[message.identity.source, error.reason] += 1
         number = self._log.next_number(REFUSED_STREAM) + len(self._pending.get(REFUSED_STREAM, ()))
         refusal = refusal_of(message, error, payload_limit=self._settings.refused_payload_limit, number=number)

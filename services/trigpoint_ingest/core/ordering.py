@@ -1,6 +1,45 @@
-"""Messages of a drive put back into the order they were sent in, while what is missing is sent again."""
+"""Messages put back into the order they were sent in: live ones by number, a file's behind its description."""
 
+from collections.abc import Iterable, Iterator
+from typing import TypeVar
+
+from trigpoint.events.codec import schema_name
+from trigpoint.events.observed import VehicleDescribed
 from trigpoint_ingest.core.messages import RawMessage
+from trigpoint_ingest.core.validation import Drive, drive_of
+
+DESCRIPTION_SCHEMA = schema_name(VehicleDescribed)
+HELD_LIMIT = 10_000  # messages of a file that may stand before their drive's description
+
+MessageT = TypeVar("MessageT", bound=RawMessage)
+
+
+def described_first(messages: Iterable[MessageT]) -> Iterator[tuple[MessageT, bool]]:
+    """The messages in their order, but each drive's behind its description; with each whether its drive has one.
+
+    At most HELD_LIMIT messages wait for a description; what comes on top of them counts as without one.
+    """
+    described: set[Drive] = set()
+    held: dict[Drive, list[MessageT]] = {}
+    held_count = 0
+    for message in messages:
+        drive = drive_of(message.identity)
+        if drive in described:
+            yield message, True
+        elif message.schema_name == DESCRIPTION_SCHEMA:
+            described.add(drive)
+            waiting = held.pop(drive, [])
+            held_count -= len(waiting)
+            for ordered in (message, *waiting):
+                yield ordered, True
+        elif held_count < HELD_LIMIT:
+            held.setdefault(drive, []).append(message)
+            held_count += 1
+        else:
+            yield message, False
+    for waiting in held.values():
+        for message in waiting:
+            yield message, False
 
 
 class SequenceOrder:
