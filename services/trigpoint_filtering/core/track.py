@@ -1,0 +1,191 @@
+"""A whole drive filtered: the online fold run over its series in order of time."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trigpoint.events.drives import Drive
+from trigpoint.events.estimated import FixJudged, GateAlarmed
+from trigpoint.geodesy.poses import wrap_angles_rad
+from trigpoint.geodesy.positions import MapPosition
+from trigpoint.geodesy.projection import MapFrame, map_points_from_wgs84
+from trigpoint.geodesy.uncertainty import floored_covariance
+from trigpoint_filtering.core.estimator import Belief
+from trigpoint_filtering.core.motion import ANTENNA_X, ANTENNA_Y, HEADING, SPEED_SCALE, STATE_SIZE, X
+from trigpoint_filtering.core.online import Track, after_fix, after_imu, after_wheel, started_track
+from trigpoint_filtering.settings import FilterSettings
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+POSE_COVARIANCE_FLOOR = 1e-9  # m^2 and rad^2: 0.03 mm and 0.03 mrad
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Calibration:
+    """The filter's last word on the odometry: mean and sigma (5,) of speed scale, turn scale, turn bias
+    (rad/s for an IMU, rad for steering, rad/m for wheels), antenna x, y in m; NaN if it never had a position."""
+
+    mean: Floats
+    sigma: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FilteredDrive:
+    """What the filter made of a drive.
+
+    stamp_ns (n,) strictly rising; pose (n, 3): `T_map_base` x, y in m, heading in rad; covariance (n, 3, 3)
+    of it; speed_mps (n,) of the base; antenna_m (n, 2): the antenna as the filter believes it, in m in the
+    base frame. `judged` holds one verdict a fix, in the order of the drive's fixes; `alarms` at
+    `alarm_stamp_ns`. `refusal` says why there are no poses, empty where there are.
+    """
+
+    vehicle: str
+    boot_id: str
+    stamp_ns: Ints
+    pose: Floats
+    covariance: Floats
+    speed_mps: Floats
+    antenna_m: Floats
+    judged: tuple[FixJudged, ...]
+    alarms: tuple[GateAlarmed, ...]
+    alarm_stamp_ns: Ints
+    calibration: Calibration
+    refusal: str
+
+
+class Progress(Protocol):
+    """Told how much of the work is done."""
+
+    def __call__(self, done: int, total: int) -> None:
+        """`done` of `total` samples have been taken."""
+
+
+PROGRESS_EVERY = 1000  # samples
+
+
+def filter_drive(
+    drive: Drive, frame: MapFrame, settings: FilterSettings, *, progress: Progress | None = None
+) -> FilteredDrive:
+    """A drive filtered causally; without poses and with the reason where position or heading cannot be found."""
+    track = started_track(drive.described, boot_id=drive.boot_id, point_scale=frame.point_scale, settings=settings)
+    recording = _Recording()
+    total = len(drive.wheels.stamp_ns) + len(drive.imu.stamp_ns) + len(drive.fixes.stamp_ns)
+    for done, track in enumerate(_tracks(track, drive, frame)):
+        recording.take(track)
+        if progress is not None and done % PROGRESS_EVERY == 0:
+            progress(done, total)
+    return recording.filtered(track)
+
+
+def _tracks(track: Track, drive: Drive, frame: MapFrame) -> Iterator[Track]:
+    """The track after each sample, sorted by time; at one stamp wheels come before IMU before fixes."""
+    steps = (_wheel_samples(drive), _imu_samples(drive), _fix_samples(drive, frame))
+    for kind in _kinds_in_order(drive):
+        track = next(steps[kind])(track)
+        yield track
+
+
+def _kinds_in_order(drive: Drive) -> list[int]:
+    series = (drive.wheels.stamp_ns, drive.imu.stamp_ns, drive.fixes.stamp_ns)
+    kind = np.repeat([0, 1, 2], [len(stamps) for stamps in series])
+    ordered: list[int] = kind[np.lexsort((kind, np.concatenate(series)))].tolist()
+    return ordered
+
+
+def _wheel_samples(drive: Drive) -> Iterator[Callable[[Track], Track]]:
+    wheels = drive.wheels
+    columns = (wheels.speed_mps, wheels.steering_rad, wheels.yaw_rate_radps, wheels.stamp_ns)
+    for speed_mps, steering_rad, yaw_rate_radps, stamp_ns in zip(*(c.tolist() for c in columns), strict=True):
+        yield partial(
+            after_wheel,
+            speed_mps=speed_mps,
+            steering_rad=steering_rad,
+            yaw_rate_radps=yaw_rate_radps,
+            stamp_ns=stamp_ns,
+        )
+
+
+def _imu_samples(drive: Drive) -> Iterator[Callable[[Track], Track]]:
+    for yaw_rate_radps, stamp_ns in zip(drive.imu.yaw_rate_radps.tolist(), drive.imu.stamp_ns.tolist(), strict=True):
+        yield partial(after_imu, yaw_rate_radps=yaw_rate_radps, stamp_ns=stamp_ns)
+
+
+def _fix_samples(drive: Drive, frame: MapFrame) -> Iterator[Callable[[Track], Track]]:
+    fixes = drive.fixes
+    if len(fixes.stamp_ns) == 0:
+        return
+    point_m = map_points_from_wgs84(fixes.lat_deg, fixes.lon_deg, frame)
+    columns = (point_m, fixes.stamp_ns, fixes.sigma_m, fixes.sequence)
+    for (x_m, y_m), stamp_ns, sigma_m, sequence in zip(*(c.tolist() for c in columns), strict=True):
+        yield partial(
+            after_fix, position=MapPosition(x_m, y_m), stamp_ns=stamp_ns, sigma_m=sigma_m, sequence=sequence
+        )
+
+
+@dataclass(slots=True)
+class _Recording:
+    """What a track brought, gathered as it goes; several beliefs at one stamp count as the last of them."""
+
+    stamp_ns: list[int] = field(default_factory=list)
+    mean: list[Floats] = field(default_factory=list)
+    covariance: list[Floats] = field(default_factory=list)
+    speed_mps: list[float] = field(default_factory=list)
+    judged: list[FixJudged] = field(default_factory=list)
+    alarms: list[GateAlarmed] = field(default_factory=list)
+    alarm_stamp_ns: list[int] = field(default_factory=list)
+    newest: Belief | None = None
+
+    def take(self, track: Track) -> None:
+        if track.verdict is not None:
+            self.judged.append(track.verdict)
+        if track.alarm is not None:
+            self.alarms.append(track.alarm)
+            self.alarm_stamp_ns.append(track.believed_ns)
+        if track.hypothesis is not None and track.hypothesis.belief is not self.newest:
+            self._take_belief(track, track.hypothesis.belief)
+
+    def _take_belief(self, track: Track, belief: Belief) -> None:
+        self.newest = belief
+        if self.stamp_ns and self.stamp_ns[-1] == track.believed_ns:
+            for column in (self.stamp_ns, self.mean, self.covariance, self.speed_mps):
+                column.pop()
+        self.stamp_ns.append(track.believed_ns)
+        self.mean.append(belief.mean)
+        self.covariance.append(belief.covariance[:SPEED_SCALE, :SPEED_SCALE])
+        self.speed_mps.append(track.speed_mps)
+
+    def filtered(self, track: Track) -> FilteredDrive:
+        mean = np.array(self.mean).reshape(-1, STATE_SIZE)
+        pose = mean[:, X:SPEED_SCALE].copy()
+        pose[:, HEADING] = wrap_angles_rad(pose[:, HEADING])
+        return FilteredDrive(
+            vehicle=track.following.vehicle,
+            boot_id=track.following.boot_id,
+            stamp_ns=np.array(self.stamp_ns, dtype=np.int64),
+            pose=pose,
+            covariance=np.array([pose_covariance(part) for part in self.covariance]).reshape(-1, 3, 3),
+            speed_mps=np.array(self.speed_mps),
+            antenna_m=mean[:, ANTENNA_X : ANTENNA_Y + 1],
+            judged=tuple(self.judged),
+            alarms=tuple(self.alarms),
+            alarm_stamp_ns=np.array(self.alarm_stamp_ns, dtype=np.int64),
+            calibration=_calibration(self.newest),
+            refusal="" if self.mean else track.refusal,
+        )
+
+
+def _calibration(belief: Belief | None) -> Calibration:
+    if belief is None:
+        return Calibration(mean=np.full(5, np.nan), sigma=np.full(5, np.nan))
+    part = slice(SPEED_SCALE, ANTENNA_Y + 1)
+    return Calibration(mean=belief.mean[part], sigma=np.sqrt(belief.covariance.diagonal()[part]))
+
+
+def pose_covariance(covariance: Floats) -> Floats:
+    """The covariance (3, 3) of x, y in m and heading in rad, positive definite by a margin."""
+    return floored_covariance(covariance, floor=POSE_COVARIANCE_FLOOR)
