@@ -44,7 +44,11 @@ class PackedChunk:
 
     record: Chunk
     index_by_channel: Mapping[int, MessageIndex]
-    count: int
+
+    @property
+    def count(self) -> int:
+        """How many messages the chunk holds."""
+        return sum(len(index.records) for index in self.index_by_channel.values())
 
 
 class Readable(Protocol[RecordT]):
@@ -87,7 +91,7 @@ def pack(rows: Sequence[PackedRow], channel_ids: Sequence[int], definitions: byt
         entries.setdefault(channel_id, []).append((stamp_ns, offset))
         offset += FRAME.size + length
     data = b"".join(parts)
-    return PackedChunk(_chunk(data, [row.stamp_ns for row in rows]), _indexes(entries), len(rows))
+    return PackedChunk(_chunk(data, [row.stamp_ns for row in rows]), _indexes(entries))
 
 
 def _indexes(entries: Mapping[int, list[tuple[int, int]]]) -> dict[int, MessageIndex]:

@@ -73,9 +73,20 @@ class McapScan:
         self._lost_chunk = False  # the last chunk was damaged: its message indexes tell its count
 
     @property
+    def complete(self) -> bool:
+        """The file has its end and its summary; its data section may be damaged all the same."""
+        return self.finished and not self._summary_fault
+
+    @property
     def torn_tail(self) -> bool:
         """The file was being written when its writer stopped, and nothing before its last whole chunk is damaged."""
-        return not self.finished and all(damage.offset >= self.whole_end for damage in self.damages)
+        return not self.complete and all(damage.offset >= self.whole_end for damage in self.damages)
+
+    @property
+    def loss(self) -> Damage | None:
+        """The first damage that cost messages, a torn tail apart."""
+        lossy = (damage for damage in self.damages if damage.lost_messages)
+        return None if self.torn_tail else next(lossy, None)
 
     def chunks(self) -> Iterator[ScannedChunk]:
         """Every whole chunk, in the order of the file. A message outside of chunks counts as its own."""

@@ -1,0 +1,121 @@
+"""The files of one stream: their names, what they hold, and what a crash left of the last one mended."""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from mcap.records import Chunk
+
+from trigpoint.errors import LogDamaged
+from trigpoint.logs.catalog import Catalog, CatalogChunk, CatalogEntry, CatalogFile
+from trigpoint.logs.chunks import FRAME, PackedChunk, message_indexes, messages, parsed
+from trigpoint.logs.file_bytes import FileBytes
+from trigpoint.logs.mcap_scan import McapScan
+from trigpoint.logs.mcap_writer import FileIndex
+
+NUMBER_DIGITS = 12
+SUFFIX = ".mcap"
+
+
+def file_path(folder: Path, first_number: int) -> Path:
+    """Where the file whose first event has this number stands."""
+    return folder / f"{first_number:0{NUMBER_DIGITS}d}{SUFFIX}"
+
+
+def file_numbers(folder: Path) -> tuple[int, ...]:
+    """The first numbers of a stream's files, ascending; nothing for a stream without folder."""
+    return tuple(sorted(int(path.stem) for path in folder.glob(f"*{SUFFIX}") if path.stem.isdecimal()))
+
+
+def entry_of(folder: Path, stream: str, first_number: int) -> CatalogEntry:
+    """What a file holds, read from itself: every whole chunk before the first one lost."""
+    scan = McapScan(file_path(folder, first_number))
+    size_bytes = scan.path.stat().st_size
+    chunks = tuple(_catalog_chunks(scan, first_number))
+    file = CatalogFile(stream, first_number, size_bytes, scan.complete, str(scan.loss) if scan.loss else "")
+    return CatalogEntry(file, chunks, tuple(sorted(scan.channels.items())))
+
+
+def _catalog_chunks(scan: McapScan, first_number: int) -> Iterator[CatalogChunk]:
+    number = first_number
+    for chunk in scan.chunks():
+        if any(damage.lost_messages for damage in scan.damages):
+            continue  # what follows a loss has no certain number
+        channels = [message.channel_id for message in messages(chunk.data)]
+        place = (chunk.start_ns, chunk.end_ns, chunk.offset, chunk.length)
+        yield CatalogChunk(first_number, number, len(channels), *place, tuple(sorted(set(channels))))
+        number += len(channels)
+
+
+def bring_up_to_date(catalog: Catalog, folder: Path, stream: str) -> None:
+    """The catalog says of a stream what its files say: those whose size it does not know are read."""
+    known = {file.first_number: file for file in catalog.files(stream)}
+    there = file_numbers(folder)
+    for first_number in there:
+        size_bytes = file_path(folder, first_number).stat().st_size
+        if first_number not in known or known[first_number].size_bytes != size_bytes:
+            catalog.replace(entry_of(folder, stream, first_number))
+    for gone in known.keys() - set(there):
+        catalog.remove(known[gone])
+
+
+def mend(catalog: Catalog, folder: Path, stream: str) -> None:
+    """Every file of a stream ended with its summary; one a crash left open is cut after its last whole chunk.
+
+    Raises LogDamaged where events that were acknowledged, or more than a torn tail, would be lost by that.
+    """
+    for file in catalog.files(stream):
+        if not file.finished:
+            _mend_file(catalog, folder, file)
+
+
+def _mend_file(catalog: Catalog, folder: Path, file: CatalogFile) -> None:
+    path = file_path(folder, file.first_number)
+    entry = entry_of(folder, file.stream, file.first_number)
+    if entry.file.damage:
+        raise LogDamaged(f"{entry.file.damage}: not mended, since more than its tail is damaged")
+    acknowledged = [chunk for chunk in catalog.chunks(file.stream) if chunk.first_number == file.first_number]
+    if len(acknowledged) > len(entry.chunks):
+        lost = acknowledged[len(entry.chunks)]
+        raise LogDamaged(
+            f"{path}, byte {lost.offset}: events from number {lost.number} on were acknowledged and are lost"
+        )
+    if not entry.chunks:
+        path.unlink()
+        catalog.remove(file)
+        return
+    end_whole(path)
+    catalog.replace(entry_of(folder, file.stream, file.first_number))
+
+
+def end_whole(path: Path) -> None:
+    """The file cut after its last whole chunk and ended with its summary; opened again, it is without damage.
+
+    Raises LogDamaged if it is not, OSError if it cannot be written.
+    """
+    scan = McapScan(path)
+    index = FileIndex()
+    with FileBytes(path) as content:
+        tail, end = b"", 0
+        for chunk in scan.chunks():
+            end = chunk.offset + chunk.length
+            record = parsed(Chunk, content.read(chunk.offset + FRAME.size, end))
+            packed = PackedChunk(record, message_indexes(chunk.data))
+            tail = index.add_chunk(packed, chunk.offset)[chunk.length :]
+        index.schemas, index.channels, index.metadata = scan.schemas, scan.channel_records, scan.metadata_indexes
+        _rewrite_end(path, end, tail, index)
+    again = McapScan(path)
+    count = sum(1 for _ in again.chunks())
+    if again.damages or count != len(index.chunks):
+        raise LogDamaged(f"{path}: still damaged after its end was written anew: {again.damages}")
+
+
+def _rewrite_end(path: Path, end: int, tail: bytes, index: FileIndex) -> None:
+    with path.open("r+b", buffering=0) as file:
+        os.ftruncate(file.fileno(), end)
+        os.pwrite(file.fileno(), tail, end)
+        with FileBytes(path) as content:
+            checksum = content.checksum(0, content.size_bytes)
+        ending = index.ending(offset=end + len(tail), data_crc=checksum)
+        os.pwrite(file.fileno(), ending, end + len(tail))
+        os.fsync(file.fileno())

@@ -1,0 +1,216 @@
+"""The event log in MCAP files: `<directory>/<stream>/<first number>.mcap`, and a catalog of them beside."""
+
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from mcap.opcode import Opcode
+from mcap.records import Chunk
+
+from trigpoint.errors import InputError, LogDamaged
+from trigpoint.events.codec import Event, decode, event_class
+from trigpoint.events.envelope import Envelope, EventIdentity, LogPosition
+from trigpoint.events.keys import DEFAULT_MAP, valid_name
+from trigpoint.events.observed import MapFramePinned
+from trigpoint.logs.catalog import NAME, Catalog, CatalogChunk, FileContents
+from trigpoint.logs.channels import ChannelKey, PackedRow, packed
+from trigpoint.logs.chunks import FRAME, messages, parsed, unpacked
+from trigpoint.logs.log_files import bring_up_to_date, file_path
+from trigpoint.logs.ports import LoggedEvent
+from trigpoint.logs.stream_writer import Rotation, StreamWriter
+
+DEFAULT_ROTATION = Rotation()
+
+
+@dataclass(slots=True)
+class ReadCounts:
+    """How many files were opened and chunks decompressed for reading, since the log was opened."""
+
+    files: int = 0
+    chunks: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class _Wanted:
+    """What of a stream is to be read."""
+
+    first_number: int
+    from_ns: int | None
+    until_ns: int | None
+    kinds: frozenset[type] | None
+
+    def channels(self, known: Mapping[int, ChannelKey]) -> dict[int, ChannelKey]:
+        """Those of the channels whose events are wanted."""
+        kinds = self.kinds
+        if kinds is None:
+            return dict(known)
+        return {number: key for number, key in known.items() if event_class(key.schema_name) in kinds}
+
+    def holds(self, number: int, stamp_ns: int) -> bool:
+        """Whether an event of this number and time is wanted."""
+        early = self.from_ns is not None and stamp_ns < self.from_ns
+        late = self.until_ns is not None and stamp_ns >= self.until_ns
+        return number >= self.first_number and not early and not late
+
+
+class McapLog:
+    """An EventLog on disk. Any number of readers, in any process; a stream's first append makes this its writer."""
+
+    def __init__(
+        self,
+        directory: Path,
+        *,
+        rotation: Rotation = DEFAULT_ROTATION,
+        software: str = "trigpoint",
+        map_name: str = DEFAULT_MAP,
+    ) -> None:
+        directory.mkdir(parents=True, exist_ok=True)
+        self.directory = directory
+        self.read_counts = ReadCounts()
+        self._rotation, self._software = rotation, software
+        self._map = {"name": map_name}
+        self._catalog = Catalog(directory / NAME)
+        self._writers: dict[str, StreamWriter] = {}
+        self._lock = threading.RLock()
+        for folder in self._folders():
+            bring_up_to_date(self._catalog, folder, folder.name)
+
+    def describe(self, frame: MapFramePinned) -> None:
+        """Files begun from now on name the map's frame in their metadata."""
+        origin = {"origin_easting_m": repr(frame.origin_easting_m), "origin_northing_m": repr(frame.origin_northing_m)}
+        self._map = {"name": self._map["name"], "crs": frame.crs, **origin}
+
+    def append(self, stream: str, rows: Sequence[Envelope[Event]]) -> LogPosition:
+        """The position of the last row (of the last event there, without rows), once all rows are durable.
+
+        Raises AppendFailed if they cannot be made so or another process writes the stream, InputError for a name,
+        stamp or sequence no log can hold, EventRejected for a value its schema cannot hold.
+        """
+        if valid_name(stream).startswith("."):
+            raise InputError(f"stream {stream!r} starts with a dot: such folders are not logs")
+        ready = [packed(row) for row in rows]
+        with self._lock:
+            writer = self._writer(stream)
+            if ready:
+                self._append(writer, stream, ready)
+            return LogPosition(stream, writer.next_number - 1)
+
+    def _append(self, writer: StreamWriter, stream: str, rows: Sequence[PackedRow]) -> None:
+        try:
+            writer.append(rows, self._metadata(stream, rows[0].channel.vehicle))
+        except BaseException:
+            del self._writers[stream]
+            raise
+
+    def _writer(self, stream: str) -> StreamWriter:
+        if stream not in self._writers:
+            self._writers[stream] = StreamWriter(self.directory / stream, self._catalog, rotation=self._rotation)
+        return self._writers[stream]
+
+    def _metadata(self, stream: str, vehicle: str) -> dict[str, dict[str, str]]:
+        records = {"software": {"name": self._software}, "map": self._map}
+        return records | ({"vehicle": {"name": vehicle}} if vehicle and stream.endswith(vehicle) else {})
+
+    def read(
+        self,
+        stream: str,
+        *,
+        first_number: int = 0,
+        from_ns: int | None = None,
+        until_ns: int | None = None,
+        kinds: Sequence[type] | None = None,
+    ) -> Iterator[LoggedEvent]:
+        """The events that were durable when reading began, filtered as EventLog says.
+
+        Raises LogDamaged where a chunk is damaged, after everything before it.
+        """
+        bring_up_to_date(self._catalog, self.directory / stream, stream)
+        wanted = _Wanted(first_number, from_ns, until_ns, frozenset(kinds) if kinds is not None else None)
+        chunks = self._catalog.chunks(stream, first_number=first_number, from_ns=from_ns, until_ns=until_ns)
+        damages = self._damages(stream, first_number)
+        by_file: dict[int, list[CatalogChunk]] = {}
+        for chunk in chunks:
+            by_file.setdefault(chunk.first_number, []).append(chunk)
+        for first in sorted(by_file.keys() | damages.keys()):
+            yield from self._read_file(stream, first, by_file.get(first, []), wanted)
+            if first in damages:
+                raise LogDamaged(damages[first])
+
+    def _damages(self, stream: str, number: int) -> dict[int, str]:
+        """Of each damaged file that may hold this number or later ones, what is wrong."""
+        files = self._catalog.files(stream)
+        ends = [file.first_number for file in files[1:]] + [number + 1]
+        return {
+            file.first_number: file.damage
+            for file, end in zip(files, ends, strict=True)
+            if file.damage and end > number
+        }
+
+    def _read_file(
+        self, stream: str, first_number: int, chunks: Sequence[CatalogChunk], wanted: _Wanted
+    ) -> Iterator[LoggedEvent]:
+        channels = wanted.channels(self._catalog.channels(stream, first_number))
+        needed = [chunk for chunk in chunks if not channels.keys().isdisjoint(chunk.channel_ids)]
+        if not needed:
+            return
+        path = file_path(self.directory / stream, first_number)
+        with path.open("rb") as file:
+            self.read_counts.files += 1
+            for chunk in needed:
+                self.read_counts.chunks += 1
+                yield from _events(_chunk_data(file, path, chunk), stream, chunk.number, channels, wanted)
+
+    def streams(self) -> tuple[str, ...]:
+        """The names of all streams that hold an event, sorted."""
+        for folder in self._folders():
+            bring_up_to_date(self._catalog, folder, folder.name)
+        return self._catalog.streams()
+
+    def next_number(self, stream: str) -> int:
+        """The number the next appended event will get; 0 for an unknown stream."""
+        bring_up_to_date(self._catalog, self.directory / stream, stream)
+        return self._catalog.next_number(stream)
+
+    def contents(self, stream: str) -> tuple[FileContents, ...]:
+        """What each file of a stream holds, from the catalog."""
+        bring_up_to_date(self._catalog, self.directory / stream, stream)
+        return self._catalog.contents(stream)
+
+    def close(self) -> None:
+        """All files ended with their index, all streams let go. Raises AppendFailed if that cannot be written."""
+        with self._lock:
+            try:
+                while self._writers:
+                    _, writer = self._writers.popitem()
+                    writer.close()
+            finally:
+                self._catalog.close()
+
+    def _folders(self) -> tuple[Path, ...]:
+        return tuple(sorted(path for path in self.directory.iterdir() if path.is_dir()))
+
+
+def _chunk_data(file: BinaryIO, path: Path, chunk: CatalogChunk) -> bytes:
+    """The records of a chunk, checked. Raises LogDamaged."""
+    file.seek(chunk.offset)
+    record = file.read(chunk.length)
+    try:
+        if len(record) < chunk.length or FRAME.unpack_from(record) != (Opcode.CHUNK, chunk.length - FRAME.size):
+            raise LogDamaged(f"no chunk of {chunk.length} bytes")
+        return unpacked(parsed(Chunk, record[FRAME.size :]))
+    except LogDamaged as error:
+        raise LogDamaged(f"{path}, byte {chunk.offset}: {error}; {chunk.count} messages lost") from error
+
+
+def _events(
+    data: bytes, stream: str, number: int, channels: Mapping[int, ChannelKey], wanted: _Wanted
+) -> Iterator[LoggedEvent]:
+    """The wanted ones among the events of a chunk; the first has this number."""
+    for index, message in enumerate(messages(data), start=number):
+        key = channels.get(message.channel_id)
+        if key is not None and wanted.holds(index, message.log_time_ns):
+            identity = EventIdentity(key.source, key.boot_id, key.sequence_base + message.mcap_sequence)
+            envelope = Envelope(identity, message.log_time_ns, decode(key.schema_name, message.payload))
+            yield LoggedEvent(LogPosition(stream, index), envelope)

@@ -1,0 +1,57 @@
+"""The event log's twin in memory: the same answers, nothing kept beyond the process."""
+
+import threading
+from collections.abc import Iterator, Sequence
+
+from trigpoint.events.codec import Event
+from trigpoint.events.envelope import Envelope, LogPosition
+from trigpoint.events.keys import valid_name
+from trigpoint.logs.channels import packed
+from trigpoint.logs.ports import LoggedEvent
+
+
+class MemoryLog:
+    """An EventLog that keeps its streams in lists."""
+
+    def __init__(self) -> None:
+        self._streams: dict[str, list[Envelope[Event]]] = {}
+        self._lock = threading.Lock()
+
+    def append(self, stream: str, rows: Sequence[Envelope[Event]]) -> LogPosition:
+        """The position of the last row. Raises InputError for a name, stamp or sequence no file could hold."""
+        valid_name(stream)
+        for row in rows:
+            packed(row)
+        with self._lock:
+            kept = self._streams.setdefault(stream, [])
+            kept.extend(rows)
+            return LogPosition(stream, len(kept) - 1)
+
+    def read(
+        self,
+        stream: str,
+        *,
+        first_number: int = 0,
+        from_ns: int | None = None,
+        until_ns: int | None = None,
+        kinds: Sequence[type] | None = None,
+    ) -> Iterator[LoggedEvent]:
+        """The events that were in the stream when reading began, filtered as EventLog says."""
+        with self._lock:
+            rows = self._streams.get(stream, [])[first_number:]
+        for number, row in enumerate(rows, start=first_number):
+            early = from_ns is not None and row.stamp_ns < from_ns
+            late = until_ns is not None and row.stamp_ns >= until_ns
+            if not early and not late and (kinds is None or isinstance(row.event, tuple(kinds))):
+                yield LoggedEvent(LogPosition(stream, number), row)
+
+    def streams(self) -> tuple[str, ...]:
+        """The names of all streams that hold an event, sorted."""
+        return tuple(sorted(stream for stream, rows in self._streams.items() if rows))
+
+    def next_number(self, stream: str) -> int:
+        """The number the next appended event will get."""
+        return len(self._streams.get(stream, []))
+
+    def close(self) -> None:
+        """Nothing to flush; what was appended stays readable."""

@@ -1,0 +1,164 @@
+"""The one writer of a stream: holds its lock, appends durably, begins a new file where one is long enough."""
+
+import fcntl
+import os
+import sqlite3
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from io import FileIO
+from pathlib import Path
+from typing import BinaryIO
+
+from trigpoint.errors import AppendFailed
+from trigpoint.logs.catalog import Catalog, CatalogChunk, CatalogEntry, CatalogFile
+from trigpoint.logs.channels import PackedRow
+from trigpoint.logs.log_files import bring_up_to_date, file_path, mend
+from trigpoint.logs.mcap_writer import CHANNEL_LIMIT, McapFileWriter, WrittenChunk
+
+LOCK_NAME = ".lock"
+FILE_BYTES = 64 * 1024 * 1024  # small enough to copy and to rescan in about a second
+FILE_SPAN_NS = 3_600_000_000_000  # an hour of measurements
+
+
+@dataclass(frozen=True, slots=True)
+class Rotation:
+    """When a file is long enough: by its bytes, or by the time its measurements span."""
+
+    size_bytes: int = FILE_BYTES
+    span_ns: int = FILE_SPAN_NS
+
+
+@dataclass(slots=True)
+class _OpenFile:
+    """The file a stream is at, and what of it is durable."""
+
+    first_number: int
+    file: FileIO
+    writer: McapFileWriter
+    start_ns: int
+    end_ns: int
+    channels_known: int = 0
+    durable_bytes: int = 0
+
+
+class StreamWriter:
+    """Appends to one stream; exists once per stream among all processes."""
+
+    def __init__(self, folder: Path, catalog: Catalog, *, rotation: Rotation) -> None:
+        """The stream claimed and what a crash left of it mended.
+
+        Raises AppendFailed if another writer has it, LogDamaged if it cannot be mended without loss.
+        """
+        self._folder, self._catalog, self._rotation = folder, catalog, rotation
+        self._open_file: _OpenFile | None = None
+        self._lock = _locked(folder)
+        try:
+            bring_up_to_date(catalog, folder, folder.name)
+            mend(catalog, folder, folder.name)
+        except OSError as error:
+            self._lock.close()
+            raise AppendFailed(f"stream {folder.name}: not mended: {error}") from error
+        except BaseException:
+            self._lock.close()
+            raise
+        self.next_number = catalog.next_number(folder.name)
+
+    def append(self, rows: Sequence[PackedRow], metadata: Mapping[str, Mapping[str, str]]) -> None:
+        """The rows durable. Raises AppendFailed; nothing of them counts as appended then, and the stream is let go."""
+        try:
+            target = self._open_file or self._begin(rows[0], metadata)
+            chunks = target.writer.append(rows)
+            os.fsync(target.file.fileno())
+            target.durable_bytes = target.writer.size_bytes
+            self._enter(target, chunks)
+            if self._is_long_enough(target):
+                self._end(target)
+        except (OSError, sqlite3.Error) as error:
+            self._abandon()
+            raise AppendFailed(f"stream {self._folder.name}, number {self.next_number}: {error}") from error
+
+    def close(self) -> None:
+        """The file ended with its summary, the stream let go. Raises AppendFailed if that cannot be written."""
+        try:
+            if self._open_file:
+                self._end(self._open_file)
+        except (OSError, sqlite3.Error) as error:
+            self._abandon()
+            raise AppendFailed(f"stream {self._folder.name}: last file not ended: {error}") from error
+        self._lock.close()
+
+    def _begin(self, row: PackedRow, metadata: Mapping[str, Mapping[str, str]]) -> _OpenFile:
+        file = file_path(self._folder, self.next_number).open("xb", buffering=0)
+        writer = McapFileWriter(file, metadata=metadata)
+        self._open_file = _OpenFile(self.next_number, file, writer, row.stamp_ns, row.stamp_ns)
+        _sync_folder(self._folder)
+        _sync_folder(self._folder.parent)
+        return self._open_file
+
+    def _enter(self, target: _OpenFile, chunks: Sequence[WrittenChunk]) -> None:
+        """What is durable now entered in the catalog and counted."""
+        entered = []
+        for chunk in chunks:
+            place = (chunk.start_ns, chunk.end_ns, chunk.offset, chunk.length)
+            entered.append(CatalogChunk(target.first_number, self.next_number, chunk.count, *place, chunk.channel_ids))
+            self.next_number += chunk.count
+            target.start_ns = min(target.start_ns, chunk.start_ns)
+            target.end_ns = max(target.end_ns, chunk.end_ns)
+        channels = [(number, key) for key, number in target.writer.channels.items() if number > target.channels_known]
+        target.channels_known = len(target.writer.channels)
+        state = self._state(target, finished=False)
+        self._catalog.add(CatalogEntry(state, tuple(entered), tuple(channels)))
+
+    def _state(self, target: _OpenFile, *, finished: bool) -> CatalogFile:
+        return CatalogFile(self._folder.name, target.first_number, target.writer.size_bytes, finished)
+
+    def _is_long_enough(self, target: _OpenFile) -> bool:
+        return (
+            target.writer.size_bytes >= self._rotation.size_bytes
+            or target.end_ns - target.start_ns >= self._rotation.span_ns
+            or len(target.writer.channels) >= CHANNEL_LIMIT // 2
+        )
+
+    def _end(self, target: _OpenFile) -> None:
+        target.writer.finish()
+        os.fsync(target.file.fileno())
+        target.file.close()
+        self._open_file = None
+        self._catalog.add(CatalogEntry(self._state(target, finished=True), (), ()))
+
+    def _abandon(self) -> None:
+        """After a failure: what is not durable cut off, as far as the disk lets us, and the stream let go."""
+        target, self._open_file = self._open_file, None
+        if target and not target.file.closed:
+            os.ftruncate(target.file.fileno(), target.durable_bytes)
+            target.file.close()
+        self._lock.close()
+
+
+def _locked(folder: Path) -> BinaryIO:
+    """The stream's lock, held until closed. Raises AppendFailed if another writer holds it."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = (folder / LOCK_NAME).open("a+b")
+    except OSError as error:
+        raise AppendFailed(f"stream {folder.name}: {error}") from error
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        lock.seek(0)
+        holder = lock.read().decode("ascii", "replace") or "unknown"
+        lock.close()
+        raise AppendFailed(f"stream {folder.name} has a writer already, process {holder}: one at a time") from error
+    lock.truncate(0)
+    lock.write(str(os.getpid()).encode())
+    lock.flush()
+    return lock
+
+
+def _sync_folder(folder: Path) -> None:
+    """A new name in the folder made durable."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
