@@ -9,7 +9,8 @@ INI = "[pytest]\nmarkers =\n    browser: b\n    postgis: p\n    data: d\n"
 
 
 @pytest.fixture
-def suite(pytester: pytest.Pytester) -> pytest.Pytester:
+def suite(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")  # others' plugins take seconds to load again
     pytester.makeconftest(CONFTEST.read_text(encoding="utf-8"))
     pytester.makefile(".ini", pytest=INI)
     return pytester
