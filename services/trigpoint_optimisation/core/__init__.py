@@ -1,0 +1,1 @@
+"""Association, factor graph and robust solve: functions of their arguments; gtsam's one home."""

@@ -1,0 +1,108 @@
+"""The factors gtsam does not have: odometry with calibration, a fix at a lever arm, an anchor in an image.
+
+Each function returns one `gtsam.CustomFactor` whose Jacobians are analytic; gtsam's Pose2 increments are in the
+body frame: x, y in m, heading in rad.
+"""
+
+import math
+from collections.abc import Callable
+
+import gtsam
+import numpy as np
+from numpy.typing import NDArray
+
+from trigpoint.geodesy.poses import wrap_angle_rad
+
+Floats = NDArray[np.float64]
+Jacobians = list[Floats] | None
+ErrorFunction = Callable[[gtsam.CustomFactor, gtsam.Values, Jacobians], Floats]
+
+
+def odometry_factor(
+    keys: tuple[int, int, int, int], delta: Floats, derivative: Floats, *, reference: Floats, covariance: Floats
+) -> gtsam.CustomFactor:
+    """Motion from keyframe keys[0] to keys[1] as the wheels tell it under scales keys[2] (2,) and turn bias keys[3] (1,).
+
+    delta (3,) was integrated at the calibration `reference` (3,): speed scale, turn scale, turn bias; derivative
+    (3, 3) is its derivative there (Forster et al. 2017, first-order bias correction, in SE(2)).
+    """
+    key_from, key_to, key_scale, key_bias = keys
+    by_scale, by_bias = -derivative[:, :2], -derivative[:, 2:]
+
+    def error(_: gtsam.CustomFactor, values: gtsam.Values, jacobians: Jacobians) -> Floats:
+        start, end = values.atPose2(key_from), values.atPose2(key_to)
+        scale, bias = values.atVector(key_scale), values.atVector(key_bias)
+        change = (scale[0] - reference[0], scale[1] - reference[1], bias[0] - reference[2])
+        expected = delta + derivative @ change
+        c, s = math.cos(start.theta()), math.sin(start.theta())
+        east, north = end.x() - start.x(), end.y() - start.y()
+        ahead, left = c * east + s * north, c * north - s * east
+        turned = end.theta() - start.theta()
+        if jacobians is not None:
+            ct, st = math.cos(turned), math.sin(turned)
+            jacobians[0] = np.array([[-1.0, 0.0, left], [0.0, -1.0, -ahead], [0.0, 0.0, -1.0]])
+            jacobians[1] = np.array([[ct, -st, 0.0], [st, ct, 0.0], [0.0, 0.0, 1.0]])
+            jacobians[2] = by_scale
+            jacobians[3] = by_bias
+        return np.array([ahead - expected[0], left - expected[1], wrap_angle_rad(turned - expected[2])])
+
+    return gtsam.CustomFactor(gtsam.noiseModel.Gaussian.Covariance(covariance), list(keys), error)
+
+
+def fix_factor(
+    keys: tuple[int, ...], fix_m: Floats, *, T_keyframe_base: Floats, bias_weight: tuple[float, float], noise: gtsam.noiseModel.Base
+) -> gtsam.CustomFactor:
+    """A fix (2,) in the map against the antenna at lever arm keys[1] (2,) of the base at the fix's time.
+
+    keys: keyframe, lever arm and, if the receiver's slow error is a state, its two neighbouring knots (2,) each
+    with weights `bias_weight`. T_keyframe_base (3,): the base at the fix's time in the keyframe's frame.
+    """
+    x_m, y_m, turned = T_keyframe_base
+    turn = np.array([[math.cos(turned), -math.sin(turned)], [math.sin(turned), math.cos(turned)]])
+    weights = bias_weight[: len(keys) - 2]
+
+    def error(_: gtsam.CustomFactor, values: gtsam.Values, jacobians: Jacobians) -> Floats:
+        pose = values.atPose2(keys[0])
+        arm = turn @ values.atVector(keys[1])
+        ahead, left = x_m + arm[0], y_m + arm[1]
+        c, s = math.cos(pose.theta()), math.sin(pose.theta())
+        rotation = np.array([[c, -s], [s, c]])
+        predicted = np.array([pose.x() + c * ahead - s * left, pose.y() + s * ahead + c * left])
+        for key, weight in zip(keys[2:], weights, strict=True):
+            predicted = predicted + weight * values.atVector(key)
+        if jacobians is not None:
+            jacobians[0] = np.column_stack([rotation, rotation @ (-left, ahead)])
+            jacobians[1] = rotation @ turn
+            for position, weight in enumerate(weights):
+                jacobians[2 + position] = weight * np.eye(2)
+        return predicted - fix_m
+
+    return gtsam.CustomFactor(noise, list(keys), error)
+
+
+def decay_factor(key_from: int, key_to: int, *, decay: float, sigma_m: float) -> gtsam.CustomFactor:
+    """A Gauss-Markov step: the state (2,) at keys_to is `decay` times that at key_from, plus noise sigma_m."""
+
+    def error(_: gtsam.CustomFactor, values: gtsam.Values, jacobians: Jacobians) -> Floats:
+        if jacobians is not None:
+            jacobians[0] = -decay * np.eye(2)
+            jacobians[1] = np.eye(2)
+        step: Floats = values.atVector(key_to) - decay * values.atVector(key_from)
+        return step
+
+    return gtsam.CustomFactor(gtsam.noiseModel.Isotropic.Sigma(2, sigma_m), [key_from, key_to], error)
+
+
+def anchor_factor(keys: tuple[int, ...], label_m: Floats, *, noise: gtsam.noiseModel.Base) -> gtsam.CustomFactor:
+    """A label (2,) in the map against landmark keys[0] plus, if there is one, its image's offset keys[1] (2,)."""
+
+    def error(_: gtsam.CustomFactor, values: gtsam.Values, jacobians: Jacobians) -> Floats:
+        predicted: Floats = values.atPoint2(keys[0])
+        if len(keys) > 1:
+            predicted = predicted + values.atVector(keys[1])
+        if jacobians is not None:
+            for position in range(len(keys)):
+                jacobians[position] = np.eye(2)
+        return predicted - label_m
+
+    return gtsam.CustomFactor(noise, list(keys), error)

@@ -1,0 +1,80 @@
+"""One whole map version as a value: what the optimiser returns, and what a log's mapped events fold back into."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trigpoint.events.mapped import (
+    AnchorAssociated,
+    ImageOffsetSolved,
+    LandmarkSolved,
+    Mapped,
+    MapSolved,
+    TrajectorySolved,
+)
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SolvedMap:
+    """A map version: its head and all its parts."""
+
+    head: MapSolved
+    trajectories: tuple[TrajectorySolved, ...]
+    landmarks: tuple[LandmarkSolved, ...]
+    anchors: tuple[AnchorAssociated, ...]
+    images: tuple[ImageOffsetSolved, ...]
+
+    def events(self) -> tuple[Mapped, ...]:
+        """All events of the version in the order they are appended: the head last."""
+        return (*self.trajectories, *self.landmarks, *self.anchors, *self.images, self.head)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LabelReduction:
+    """Everything but the anchors, marginalised onto the labelled landmarks: a Gaussian in information form.
+
+    With dx (2m,) = landmark positions minus `point_m` (m, 2), x and y of each landmark in turn, the cost is
+    1/2 dx' information dx - gradient' dx; information (2m, 2m) may be singular where only anchors fix the frame.
+    Labels (l,): `landmark_index` says which landmark each label is tied to, `label_m` (l, 2) its position in the
+    map frame, `sigma_m` (l,) its 1-sigma per axis, `image_index` (l,) its image or -1 for a survey.
+    Images (k,): `image_sigma_m` the prior 1-sigma per axis of each one's offset (label minus true position).
+    """
+
+    landmarks: tuple[str, ...]
+    point_m: Floats
+    information: Floats
+    gradient: Floats
+    labels: tuple[str, ...]
+    landmark_index: Ints
+    label_m: Floats
+    sigma_m: Floats
+    image_index: Ints
+    images: tuple[str, ...]
+    image_sigma_m: Floats
+
+
+def solved_maps(events: Iterable[Mapped]) -> tuple[SolvedMap, ...]:
+    """The complete map versions in a sequence of mapped events; parts without a head are left out."""
+    parts: dict[int, list[Mapped]] = {}
+    heads: dict[int, MapSolved] = {}
+    for event in events:
+        if isinstance(event, MapSolved):
+            heads[event.map_version] = event
+        else:
+            parts.setdefault(event.map_version, []).append(event)
+    return tuple(_assembled(heads[version], parts.get(version, [])) for version in sorted(heads))
+
+
+def _assembled(head: MapSolved, parts: list[Mapped]) -> SolvedMap:
+    return SolvedMap(
+        head=head,
+        trajectories=tuple(part for part in parts if isinstance(part, TrajectorySolved)),
+        landmarks=tuple(part for part in parts if isinstance(part, LandmarkSolved)),
+        anchors=tuple(part for part in parts if isinstance(part, AnchorAssociated)),
+        images=tuple(part for part in parts if isinstance(part, ImageOffsetSolved)),
+    )
