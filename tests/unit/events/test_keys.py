@@ -11,9 +11,8 @@ from trigpoint.events.estimated import GateAlarmed
 from trigpoint.events.keys import key_expression, key_of, stream_of, valid_name
 from trigpoint.events.mapped import LandmarkSolved, MapSolved
 from trigpoint.events.observed import GnssFixReceived, MapFramePinned
-from trigpoint.geodesy.positions import GridPosition, Wgs84Position
+from trigpoint.geodesy.positions import GridPosition
 from trigpoint.geodesy.projection import pin_map_frame
-from trigpoint.geodesy.web_tiles import tile_at
 
 FIX = GnssFixReceived(lat_deg=-33.9, lon_deg=151.2, height_m=20.0, sigma_m=3.0)
 SYDNEY = pin_map_frame(crs="EPSG:32756", origin=GridPosition(334000.0, 6250000.0))
@@ -83,16 +82,3 @@ def test_a_name_is_either_refused_or_one_chunk(name: str) -> None:
 
 def test_an_expression_has_a_star_for_each_name() -> None:
     assert key_expression(MapSolved) == "trigpoint/v1/map/*/version"
-
-
-@given(st.floats(-90.0, 90.0), st.floats(-180.0, 180.0), st.integers(0, 22))
-def test_every_position_lies_in_a_tile_of_the_grid(lat_deg: float, lon_deg: float, zoom: int) -> None:
-    tile = tile_at(Wgs84Position(lat_deg, lon_deg), zoom)
-    assert 0 <= tile.column < 2**zoom
-    assert 0 <= tile.row < 2**zoom
-
-
-def test_the_equator_and_greenwich_meet_at_the_corner_of_four_tiles() -> None:
-    south_east = tile_at(Wgs84Position(-1e-9, 1e-9), 1)
-    north_west = tile_at(Wgs84Position(1e-9, -1e-9), 1)
-    assert (south_east.column, south_east.row, north_west.column, north_west.row) == (1, 1, 0, 0)
