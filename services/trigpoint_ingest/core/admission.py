@@ -15,7 +15,7 @@ class Admission:
         self._fleet = fleet
         self._limits = limits if limits is not None else StampLimits()
         self._accepted = SeenSequences()
-        self._handled = SeenSequences()
+        self._refused = SeenSequences()
         self._described: set[Drive] = set()
         self._stamps: dict[Drive, DriveStamps] = {}
 
@@ -39,7 +39,7 @@ class Admission:
 
     def refuse(self, identity: EventIdentity) -> bool:
         """True if this identity was not refused before: only then is the refusal worth keeping."""
-        return self._handled.add(identity)
+        return self._refused.add(identity)
 
     def recall(self, envelope: Envelope[Observed]) -> None:
         """An event found in the log taken as accepted."""
@@ -48,12 +48,15 @@ class Admission:
 
     def acknowledged(self, drive: Drive) -> int:
         """The highest sequence up to which every message of the drive was accepted or refused; -1 for none."""
-        ranges = self._handled.ranges(*drive)
-        return ranges[0][1] - 1 if ranges and ranges[0][0] == 0 else -1
+        reached = 0
+        for start, stop in sorted(self._accepted.ranges(*drive) + self._refused.ranges(*drive)):
+            if start > reached:
+                break
+            reached = max(reached, stop)
+        return reached - 1
 
     def _take(self, envelope: Envelope[Observed], drive: Drive, stamps: DriveStamps) -> None:
         self._accepted.add(envelope.identity)
-        self._handled.add(envelope.identity)
         self._stamps[drive] = stamps
         stamps.accept(type(envelope.event), envelope.stamp_ns)
         if type(envelope.event) is VehicleDescribed:

@@ -1,6 +1,7 @@
 """Map frame and the changes between WGS84, grid and map positions; pyproj's one home."""
 
 import math
+import warnings
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -60,6 +61,25 @@ def transform_coordinates(x: Floats, y: Floats, *, source_crs: str, target_crs: 
     except ProjError as error:
         raise FrameRefused(f"a position cannot be taken from {source_crs} into {target_crs}: {error}") from error
     return np.asarray(out_x, dtype=np.float64), np.asarray(out_y, dtype=np.float64)
+
+
+@lru_cache(maxsize=64)
+def transformation_between(*, source_crs: str, target_crs: str) -> str:
+    """The best operation between two CRS by PROJ's own description, with its accuracy in metres where it is known.
+
+    Raises FrameRefused for an unknown CRS, and for one that has no known relation to the other.
+    """
+    source, target = _parsed_crs(source_crs), _parsed_crs(target_crs)
+    if not (source.is_geographic or source.is_projected):
+        raise FrameRefused(f"CRS {source_crs!r} is {source.type_name}: a geographic or projected CRS is needed")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # the same is said in the answer
+        group = TransformerGroup(source, target, always_xy=True)
+    if not group.transformers:
+        raise FrameRefused(f"nothing leads from {source_crs} to {target_crs}")
+    best = group.transformers[0]
+    accuracy = f", accuracy {best.accuracy:g} m" if best.accuracy >= 0.0 else ""
+    return f"{best.description}{accuracy}{'' if group.best_available else ', a better one needs a grid not installed'}"
 
 
 def utm_crs(position: Wgs84Position) -> str:
