@@ -148,7 +148,7 @@ class Catalog:
             " AND (?4 IS NULL OR start_ns < ?4) ORDER BY number",
             (stream, first_number, from_ns, until_ns),
         )
-        return tuple(CatalogChunk(*row[:7], channel_ids=tuple(map(int, row[7].split()))) for row in rows)
+        return tuple(_chunk_of(*row) for row in rows)
 
     def channels(self, stream: str, first_number: int) -> dict[int, ChannelKey]:
         """The channels of the file with this first number."""
@@ -223,6 +223,11 @@ def _lay_out(connection: sqlite3.Connection) -> None:
         for statement in STATEMENTS.split(";"):
             connection.execute(statement)
         connection.execute(f"PRAGMA user_version = {LAYOUT}")
+
+
+def _chunk_of(*values: Any) -> CatalogChunk:
+    *numbers, channel_ids = values
+    return CatalogChunk(*numbers, tuple(map(int, channel_ids.split())))  # type: ignore[call-arg]  # a row has 8
 
 
 def _chunk_values(chunk: CatalogChunk) -> tuple[object, ...]:

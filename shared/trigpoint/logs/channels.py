@@ -8,6 +8,7 @@ is the file's first number plus the messages before it.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 from google.protobuf.descriptor import FileDescriptor
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
@@ -58,22 +59,27 @@ def packed(envelope: Envelope[Event]) -> PackedRow:
         raise InputError(f"{identity}: sequence {identity.sequence} is outside [0, {STAMP_LIMIT_NS})")
     schema_name, payload = encode(envelope.event)
     mcap_sequence = identity.sequence % SEQUENCE_SPAN
-    pattern = KEY_PATTERNS[type(envelope.event)]
-    vehicle = valid_name(vehicle_of(envelope)) if "{vehicle}" in pattern else ""
-    channel = ChannelKey(
-        topic=_topic(pattern, vehicle),
-        schema_name=schema_name,
-        source=identity.source,
-        boot_id=identity.boot_id,
-        vehicle=vehicle,
-        sequence_base=identity.sequence - mcap_sequence,
+    base = identity.sequence - mcap_sequence
+    channel = _channel(
+        type(envelope.event),  # type: ignore[arg-type]  # mypy takes a class for unhashable
+        schema_name,
+        identity.source,
+        identity.boot_id,
+        vehicle_of(envelope),
+        base,
     )
     return PackedRow(channel, mcap_sequence, stamp_ns, payload)
 
 
-def _topic(pattern: str, vehicle: str) -> str:
-    """The key's pattern filled in; a landmark's without its tile."""
-    return pattern.partition("/{zoom}")[0].format(vehicle=vehicle, map=DEFAULT_MAP)
+@lru_cache(maxsize=4096)  # one for each topic and boot of a run: hardly ever made twice
+def _channel(
+    event_class: type, schema_name: str, source: str, boot_id: str, vehicle: str, sequence_base: int
+) -> ChannelKey:
+    """The channel of a class of events; its topic is the key's pattern filled in, a landmark's without its tile."""
+    pattern = KEY_PATTERNS[event_class].partition("/{zoom}")[0]
+    about = valid_name(vehicle) if "{vehicle}" in pattern else ""
+    topic = pattern.format(vehicle=about, map=DEFAULT_MAP)
+    return ChannelKey(topic, schema_name, source, boot_id, about, sequence_base)
 
 
 def channel_record(key: ChannelKey, *, channel_id: int, schema_id: int) -> Channel:

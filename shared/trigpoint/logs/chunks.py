@@ -5,19 +5,21 @@ import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
+from itertools import chain
 from typing import NamedTuple, Protocol, TypeVar
 
 import zstandard
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, McapRecord, MessageIndex, Schema
+from mcap.records import Channel, Chunk, McapRecord, Schema
 from mcap.stream_reader import get_chunk_data_stream
 
 from trigpoint.errors import LogDamaged
 from trigpoint.logs.channels import PackedRow
 
 RecordT = TypeVar("RecordT", covariant=True)
+MessageIndexes = Mapping[int, list[tuple[int, int]]]  # by channel
 FRAME = struct.Struct("<BQ")  # opcode and length of any record
 MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 MESSAGE_FIXED_BYTES = MESSAGE.size - FRAME.size
@@ -40,15 +42,15 @@ class ChunkMessage(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PackedChunk:
-    """A chunk record and the message index records that follow it, with what a file's index says of it."""
+    """A chunk record, and for each of its channels (time, offset in the records) of each message."""
 
     record: Chunk
-    index_by_channel: Mapping[int, MessageIndex]
+    index_by_channel: MessageIndexes
 
     @property
     def count(self) -> int:
         """How many messages the chunk holds."""
-        return sum(len(index.records) for index in self.index_by_channel.values())
+        return sum(len(entries) for entries in self.index_by_channel.values())
 
 
 class Readable(Protocol[RecordT]):
@@ -94,9 +96,16 @@ def pack(rows: Sequence[PackedRow], channel_ids: Sequence[int], definitions: byt
     return PackedChunk(_chunk(data, [row.stamp_ns for row in rows]), _indexes(entries))
 
 
-def _indexes(entries: Mapping[int, list[tuple[int, int]]]) -> dict[int, MessageIndex]:
-    """A channel's entries sorted by time, as readers want them."""
-    return {channel_id: MessageIndex(channel_id, sorted(entries[channel_id])) for channel_id in sorted(entries)}
+def _indexes(entries: MessageIndexes) -> MessageIndexes:
+    """By channel, a channel's entries sorted by time, as readers want them."""
+    return {channel_id: sorted(entries[channel_id]) for channel_id in sorted(entries)}
+
+
+def message_index_bytes(channel_id: int, entries: Sequence[tuple[int, int]]) -> bytes:
+    """The message index record of one channel in a chunk, from (time, offset) of each message."""
+    size = 16 * len(entries)
+    head = FRAME.pack(Opcode.MESSAGE_INDEX, 2 + 4 + size) + struct.pack("<HI", channel_id, size)
+    return head + struct.pack(f"<{2 * len(entries)}Q", *chain.from_iterable(entries))
 
 
 def _chunk(data: bytes, stamps_ns: Sequence[int]) -> Chunk:
@@ -155,7 +164,7 @@ def definitions(data: bytes) -> tuple[tuple[Schema, ...], tuple[Channel, ...]]:
     return tuple(schemas), tuple(channels)
 
 
-def message_indexes(data: bytes) -> dict[int, MessageIndex]:
+def message_indexes(data: bytes) -> MessageIndexes:
     """The message index of each channel in a chunk, made anew from its records."""
     entries: dict[int, list[tuple[int, int]]] = {}
     for message in messages(data):

@@ -24,7 +24,7 @@ def file_path(folder: Path, first_number: int) -> Path:
 
 def file_numbers(folder: Path) -> tuple[int, ...]:
     """The first numbers of a stream's files, ascending; nothing for a stream without folder."""
-    return tuple(sorted(int(path.stem) for path in folder.glob(f"*{SUFFIX}") if path.stem.isdecimal()))
+    return tuple(sorted(int(path.stem) for path in folder.glob("[0-9]" * NUMBER_DIGITS + SUFFIX)))
 
 
 def entry_of(folder: Path, stream: str, first_number: int) -> CatalogEntry:

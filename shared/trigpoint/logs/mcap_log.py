@@ -11,7 +11,7 @@ from mcap.records import Chunk
 
 from trigpoint.errors import InputError, LogDamaged
 from trigpoint.events.codec import Event, decode, event_class
-from trigpoint.events.envelope import Envelope, EventIdentity, LogPosition
+from trigpoint.events.envelope import Envelope, LogPosition
 from trigpoint.events.keys import DEFAULT_MAP, valid_name
 from trigpoint.events.observed import MapFramePinned
 from trigpoint.logs.catalog import NAME, Catalog, CatalogChunk, FileContents
@@ -208,9 +208,8 @@ def _events(
     data: bytes, stream: str, number: int, channels: Mapping[int, ChannelKey], wanted: _Wanted
 ) -> Iterator[LoggedEvent]:
     """The wanted ones among the events of a chunk; the first has this number."""
-    for index, message in enumerate(messages(data), start=number):
-        key = channels.get(message.channel_id)
-        if key is not None and wanted.holds(index, message.log_time_ns):
-            identity = EventIdentity(key.source, key.boot_id, key.sequence_base + message.mcap_sequence)
-            envelope = Envelope(identity, message.log_time_ns, decode(key.schema_name, message.payload))
+    for index, (channel_id, sequence, stamp_ns, payload, _) in enumerate(messages(data), start=number):
+        key = channels.get(channel_id)
+        if key is not None and wanted.holds(index, stamp_ns):
+            envelope = Envelope(key.identity(sequence), stamp_ns, decode(key.schema_name, payload))
             yield LoggedEvent(LogPosition(stream, index), envelope)

@@ -24,7 +24,7 @@ from mcap.records import (
 from mcap.writer import MCAP0_MAGIC
 
 from trigpoint.logs.channels import ENCODING, ChannelKey, PackedRow, channel_record, schema_data
-from trigpoint.logs.chunks import PackedChunk, built, pack, record_bytes
+from trigpoint.logs.chunks import PackedChunk, built, message_index_bytes, pack, record_bytes
 
 LIBRARY = "trigpoint"  # without a version: it would change the bytes of the same log
 CHUNK_BYTES = 128 * 1024  # of payload: a time query decompresses little, and zstd still finds its repetitions
@@ -64,11 +64,11 @@ class FileIndex:
         """The bytes of a chunk at this offset and of its message indexes, entered into the index."""
         chunk, tail, index_offsets = record_bytes(packed.record), [], {}
         position = offset + len(chunk)
-        for channel_id, index in packed.index_by_channel.items():
-            tail.append(record_bytes(index))
+        for channel_id, entries in packed.index_by_channel.items():
+            tail.append(message_index_bytes(channel_id, entries))
             index_offsets[channel_id] = position
             position += len(tail[-1])
-            self.count_by_channel[channel_id] = self.count_by_channel.get(channel_id, 0) + len(index.records)
+            self.count_by_channel[channel_id] = self.count_by_channel.get(channel_id, 0) + len(entries)
         self.chunks.append(_chunk_index(packed, offset, len(chunk), index_offsets, position - offset - len(chunk)))
         return b"".join([chunk, *tail])
 
