@@ -81,7 +81,9 @@ def _described(vehicle: str, settings: CampusSettings) -> VehicleDescribed:
         landmark_sensor_x_m=geometry.landmark_sensor_x_m,
         landmark_sensor_y_m=geometry.landmark_sensor_y_m,
         landmark_sensor_range_m=settings.sweeps.range_max_m,
-        declared_crs=settings.crs,
+        declared_crs="" if settings.carried.gnss else settings.crs,
+        declared_origin_easting_m=0.0 if settings.carried.gnss else settings.origin_easting_m,
+        declared_origin_northing_m=0.0 if settings.carried.gnss else settings.origin_northing_m,
         software="trigpoint campus",
     )
 

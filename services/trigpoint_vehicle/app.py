@@ -1,0 +1,96 @@
+"""Reads recorded data or simulates a campus, and writes vehicles' logs with truth and anchors beside them."""
+
+import logging
+from dataclasses import dataclass
+from pathlib import Path
+
+from tqdm import tqdm
+
+from trigpoint.errors import InputError
+from trigpoint.events.truth import truth_lines
+from trigpoint.logs.vehicle_log import write_vehicle_log
+from trigpoint_vehicle.core.anchors_geojson import anchors_geojson
+from trigpoint_vehicle.core.campus import conversion_of, simulate_campus
+from trigpoint_vehicle.core.mrclam import BARCODES, LANDMARKS, RobotSources, mrclam, robot_files, robot_numbers
+from trigpoint_vehicle.core.recording import Conversion
+from trigpoint_vehicle.core.text_tables import SourceText
+from trigpoint_vehicle.core.victoria_park import GPS, INPUTS, MEASUREMENTS, victoria_park
+from trigpoint_vehicle.settings import SimulationSettings
+
+TRUTH_NAME, ANCHORS_NAME = "truth.csv", "anchors.geojson"
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Written:
+    """The files of a conversion; `truth` and `anchors` None where the source has none."""
+
+    logs: tuple[Path, ...]
+    truth: Path | None
+    anchors: Path | None
+
+
+def read_source(folder: Path, name: str) -> SourceText:
+    """A file's text. Raises InputError if it is not there or not UTF-8."""
+    path = folder / name
+    try:
+        return SourceText(str(path), path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from error
+
+
+def write_conversion(conversion: Conversion, out_dir: Path) -> Written:
+    """One `<vehicle>.mcap` a vehicle, `truth.csv` and `anchors.geojson` where there are any. Raises InputError."""
+    for remark in conversion.remarks:
+        logger.warning(remark)
+    truth, anchors = out_dir / TRUTH_NAME, out_dir / ANCHORS_NAME
+    known = conversion.truth
+    has_truth = bool(known.paths or known.landmarks or known.labels or known.fixes)
+    try:
+        out_dir.mkdir(parents=True, exist_ok=True)
+        logs = tuple(_written_logs(conversion, out_dir))
+        if has_truth:
+            truth.write_text("".join(truth_lines(known)), encoding="utf-8")
+        if conversion.anchors:
+            anchors.write_text(anchors_geojson(conversion.anchors), encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{out_dir}: cannot be written: {error}") from error
+    return Written(logs=logs, truth=truth if has_truth else None, anchors=anchors if conversion.anchors else None)
+
+
+def _written_logs(conversion: Conversion, out_dir: Path) -> list[Path]:
+    logs = []
+    for recording in tqdm(conversion.recordings, desc="writing logs", unit="vehicle", disable=None):
+        path = out_dir / f"{recording.vehicle}.mcap"
+        write_vehicle_log(path, recording.rows, vehicle=recording.vehicle)
+        logs.append(path)
+    return logs
+
+
+def convert_victoria_park(source: Path, out_dir: Path) -> Written:
+    """The Victoria Park drive of a folder as a log. Raises InputError."""
+    gps, inputs, measurements = (read_source(source, name) for name in (GPS, INPUTS, MEASUREMENTS))
+    return write_conversion(victoria_park(gps, inputs, measurements), out_dir)
+
+
+def convert_mrclam(source: Path, out_dir: Path) -> Written:
+    """A UTIAS multi-robot set of a folder as logs, truth and anchors. Raises InputError."""
+    if not source.is_dir():
+        raise InputError(f"{source}: not a folder")
+    robots = robot_numbers(path.name for path in source.iterdir())
+    if not robots:
+        raise InputError(f"{source}: no RobotN_Odometry.dat here")
+    sources = [_robot_sources(source, robot) for robot in tqdm(robots, desc="reading", unit="robot", disable=None)]
+    conversion = mrclam(sources, read_source(source, BARCODES), read_source(source, LANDMARKS))
+    return write_conversion(conversion, out_dir)
+
+
+def _robot_sources(source: Path, robot: int) -> RobotSources:
+    odometry, measurement, truth = (read_source(source, name) for name in robot_files(robot))
+    return RobotSources(robot=robot, odometry=odometry, measurement=measurement, truth=truth)
+
+
+def record_campus(settings: SimulationSettings, out_dir: Path) -> Written:
+    """The simulated campus of a seed as logs, truth and anchors. Raises InputError."""
+    return write_conversion(conversion_of(simulate_campus(settings.seed, settings.campus())), out_dir)
