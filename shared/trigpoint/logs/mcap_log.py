@@ -141,10 +141,10 @@ class McapLog:
     def _damages(self, stream: str, number: int) -> dict[int, str]:
         """Of each damaged file that may hold this number or later ones, what is wrong."""
         files = self._catalog.files(stream)
-        ends = [file.first_number for file in files[1:]] + [number + 1]
+        ends = [*(file.first_number for file in files[1:]), number + 1]
         return {
             file.first_number: file.damage
-            for file, end in zip(files, ends, strict=True)
+            for file, end in zip(files, ends, strict=False)  # no file, no end: an unknown stream holds nothing
             if file.damage and end > number
         }
 
