@@ -6,7 +6,7 @@ from pathlib import Path
 
 from mcap.records import Chunk
 
-from trigpoint.errors import LogDamaged
+from trigpoint.errors import InputError, LogDamaged
 from trigpoint.logs.catalog import Catalog, CatalogChunk, CatalogEntry, CatalogFile
 from trigpoint.logs.chunks import FRAME, PackedChunk, message_indexes, messages, parsed
 from trigpoint.logs.file_bytes import FileBytes
@@ -15,6 +15,17 @@ from trigpoint.logs.mcap_writer import FileIndex
 
 NUMBER_DIGITS = 12
 SUFFIX = ".mcap"
+NAME_LIMIT_BYTES = 255  # of a folder's name, in UTF-8, on all usual file systems
+
+
+def valid_stream(stream: str) -> str:
+    """The name itself, if a folder can have it. Raises InputError."""
+    size_bytes = len(stream.encode("utf-8", "surrogatepass"))
+    if not 0 < size_bytes <= NAME_LIMIT_BYTES or not stream.isprintable():
+        raise InputError(f"stream {stream!r} has {size_bytes} bytes: 1 to {NAME_LIMIT_BYTES} that print are allowed")
+    if stream.startswith(".") or "/" in stream:
+        raise InputError(f"stream {stream!r} starts with a dot or holds a slash")
+    return stream
 
 
 def file_path(folder: Path, first_number: int) -> Path:

@@ -9,15 +9,15 @@ from typing import BinaryIO
 from mcap.opcode import Opcode
 from mcap.records import Chunk
 
-from trigpoint.errors import InputError, LogDamaged
+from trigpoint.errors import LogDamaged
 from trigpoint.events.codec import Event, decode, event_class
 from trigpoint.events.envelope import Envelope, LogPosition
-from trigpoint.events.keys import DEFAULT_MAP, valid_name
+from trigpoint.events.keys import DEFAULT_MAP
 from trigpoint.events.observed import MapFramePinned
 from trigpoint.logs.catalog import NAME, Catalog, CatalogChunk, FileContents
 from trigpoint.logs.channels import ChannelKey, PackedRow, packed
 from trigpoint.logs.chunks import FRAME, messages, parsed, unpacked
-from trigpoint.logs.log_files import bring_up_to_date, file_path
+from trigpoint.logs.log_files import bring_up_to_date, file_path, valid_stream
 from trigpoint.logs.ports import LoggedEvent
 from trigpoint.logs.stream_writer import Rotation, StreamWriter
 
@@ -88,8 +88,7 @@ class McapLog:
         Raises AppendFailed if they cannot be made so or another process writes the stream, InputError for a name,
         stamp or sequence no log can hold, EventRejected for a value its schema cannot hold.
         """
-        if valid_name(stream).startswith("."):
-            raise InputError(f"stream {stream!r} starts with a dot: such folders are not logs")
+        valid_stream(stream)
         ready = [packed(row) for row in rows]
         with self._lock:
             writer = self._writer(stream)
@@ -126,7 +125,7 @@ class McapLog:
 
         Raises LogDamaged where a chunk is damaged, after everything before it.
         """
-        bring_up_to_date(self._catalog, self.directory / stream, stream)
+        self._bring_up_to_date(stream)
         wanted = _Wanted(first_number, from_ns, until_ns, frozenset(kinds) if kinds is not None else None)
         chunks = self._catalog.chunks(stream, first_number=first_number, from_ns=from_ns, until_ns=until_ns)
         damages = self._damages(stream, first_number)
@@ -170,12 +169,12 @@ class McapLog:
 
     def next_number(self, stream: str) -> int:
         """The number the next appended event will get; 0 for an unknown stream."""
-        bring_up_to_date(self._catalog, self.directory / stream, stream)
+        self._bring_up_to_date(stream)
         return self._catalog.next_number(stream)
 
     def contents(self, stream: str) -> tuple[FileContents, ...]:
         """What each file of a stream holds, from the catalog."""
-        bring_up_to_date(self._catalog, self.directory / stream, stream)
+        self._bring_up_to_date(stream)
         return self._catalog.contents(stream)
 
     def close(self) -> None:
@@ -187,6 +186,9 @@ class McapLog:
                     writer.close()
             finally:
                 self._catalog.close()
+
+    def _bring_up_to_date(self, stream: str) -> None:
+        bring_up_to_date(self._catalog, self.directory / valid_stream(stream), stream)
 
     def _folders(self) -> tuple[Path, ...]:
         return tuple(sorted(path for path in self.directory.iterdir() if path.is_dir()))

@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 
 from trigpoint.events.codec import Event
 from trigpoint.events.envelope import Envelope, LogPosition
-from trigpoint.events.keys import valid_name
 from trigpoint.logs.channels import packed
+from trigpoint.logs.log_files import valid_stream
 from trigpoint.logs.ports import LoggedEvent
 
 
@@ -19,7 +19,7 @@ class MemoryLog:
 
     def append(self, stream: str, rows: Sequence[Envelope[Event]]) -> LogPosition:
         """The position of the last row. Raises InputError for a name, stamp or sequence no file could hold."""
-        valid_name(stream)
+        valid_stream(stream)
         for row in rows:
             packed(row)
         with self._lock:

@@ -1,0 +1,167 @@
+"""Any event of each class, for property tests, and when two events are the same."""
+
+import math
+from dataclasses import fields
+
+import hypothesis.strategies as st
+import numpy as np
+from hypothesis.extra.numpy import arrays
+from hypothesis.strategies import SearchStrategy
+
+from trigpoint.events.codec import Event
+from trigpoint.events.corrected import AnchorLabelled
+from trigpoint.events.estimated import FixJudged, GateAlarmed, PoseFiltered
+from trigpoint.events.mapped import AnchorAssociated, ImageOffsetSolved, LandmarkSolved, MapSolved, TrajectorySolved
+from trigpoint.events.observed import (
+    EventRefused,
+    GnssFixReceived,
+    ImuMeasured,
+    LandmarkDetection,
+    LandmarksDetected,
+    MapFramePinned,
+    VehicleDescribed,
+    WheelPairMeasured,
+    WheelSpeedMeasured,
+)
+
+any_float = st.floats()
+any_text = st.text(max_size=20)
+any_int = st.integers(-(2**63), 2**63 - 1)
+# A fix's sigma travels squared: what neither overflows nor underflows then, its sign, 0, infinity and NaN come back.
+any_sigma_m = (
+    st.floats(1e-150, 1e150) | st.floats(-1e150, -1e-150) | st.sampled_from([0.0, -0.0, math.inf, -math.inf, math.nan])
+)
+by_kind: dict[type, SearchStrategy[object]] = {float: any_float, str: any_text, int: any_int, bool: st.booleans()}
+FLAT = (
+    VehicleDescribed,
+    WheelSpeedMeasured,
+    WheelPairMeasured,
+    ImuMeasured,
+    MapFramePinned,
+    AnchorLabelled,
+    FixJudged,
+    GateAlarmed,
+)
+
+
+def _array(*shape: int) -> SearchStrategy[object]:
+    return arrays(np.float64, shape, elements=any_float)
+
+
+def _flat(event_class: type) -> SearchStrategy[object]:
+    by_name = {field.name: by_kind[field.type] for field in fields(event_class)}  # type: ignore[index]
+    return st.builds(event_class, **by_name)
+
+
+def _trajectory(count: int) -> SearchStrategy[object]:
+    return st.builds(
+        TrajectorySolved,
+        map_version=any_int,
+        vehicle=any_text,
+        boot_id=any_text,
+        stamp_ns=arrays(np.int64, count),
+        pose=_array(count, 3),
+        covariance=_array(count, 3, 3),
+        calibration=st.lists(st.tuples(any_text, any_float, any_float), max_size=3).map(tuple),
+    )
+
+
+_detection = st.builds(
+    LandmarkDetection,
+    range_m=any_float,
+    bearing_rad=any_float,
+    kind=any_text,
+    signature=any_text,
+    diameter_m=any_float,
+)
+_texts = st.lists(any_text, max_size=3).map(tuple)
+ANY_EVENT: dict[type, SearchStrategy[object]] = {
+    **{event_class: _flat(event_class) for event_class in FLAT},
+    GnssFixReceived: st.builds(
+        GnssFixReceived, lat_deg=any_float, lon_deg=any_float, height_m=any_float, sigma_m=any_sigma_m
+    ),
+    LandmarksDetected: st.builds(LandmarksDetected, detections=st.lists(_detection, max_size=4).map(tuple)),
+    EventRefused: st.builds(
+        EventRefused,
+        source=any_text,
+        reason=any_text,
+        detail=any_text,
+        schema_name=any_text,
+        payload=st.binary(max_size=40),
+    ),
+    PoseFiltered: st.builds(
+        PoseFiltered,
+        vehicle=any_text,
+        boot_id=any_text,
+        x_m=any_float,
+        y_m=any_float,
+        heading_rad=any_float,
+        speed_mps=any_float,
+        covariance=_array(3, 3),
+    ),
+    MapSolved: st.builds(
+        MapSolved,
+        map_version=any_int,
+        method=any_text,
+        settings_json=any_text,
+        inputs=st.lists(st.tuples(any_text, any_int), max_size=3).map(tuple),
+        landmark_count=any_int,
+        anchor_count=any_int,
+        wall_s=any_float,
+    ),
+    TrajectorySolved: st.integers(0, 3).flatmap(_trajectory),
+    LandmarkSolved: st.builds(
+        LandmarkSolved,
+        map_version=any_int,
+        landmark=any_text,
+        kind=any_text,
+        signature=any_text,
+        position_m=_array(2),
+        covariance_m2=_array(2, 2),
+        observation_count=any_int,
+        vehicles=_texts,
+        first_seen_ns=any_int,
+        last_seen_ns=any_int,
+        anchors=_texts,
+        observations=st.lists(st.tuples(any_text, any_text, any_int), max_size=3).map(tuple),
+    ),
+    AnchorAssociated: st.builds(
+        AnchorAssociated,
+        map_version=any_int,
+        anchor=any_text,
+        landmark=any_text,
+        reason=any_text,
+        residual_m=_array(2),
+    ),
+    ImageOffsetSolved: st.builds(
+        ImageOffsetSolved, map_version=any_int, image=any_text, offset_m=_array(2), covariance_m2=_array(2, 2)
+    ),
+}
+
+
+def same_value(left: object, right: object) -> bool:
+    """Equal of the same type, floats bit by bit but for the kind of NaN, arrays by shape, type and number."""
+    if type(left) is not type(right):
+        return False
+    if isinstance(left, float) and isinstance(right, float):
+        both_nan = math.isnan(left) and math.isnan(right)
+        return both_nan or (left == right and math.copysign(1.0, left) == math.copysign(1.0, right))
+    if isinstance(left, np.ndarray) and isinstance(right, np.ndarray):
+        same_kind = left.dtype == right.dtype and left.shape == right.shape
+        return same_kind and bool(np.array_equal(left, right, equal_nan=left.dtype.kind == "f"))
+    if isinstance(left, tuple) and isinstance(right, tuple):
+        return len(left) == len(right) and all(map(same_value, left, right))
+    if isinstance(left, LandmarkDetection):
+        return same_fields(left, right)
+    return left == right
+
+
+def same_fields(left: object, right: object) -> bool:
+    """All fields of two events of one class have the same values."""
+    names = [field.name for field in fields(left)]  # type: ignore[arg-type]
+    return type(left) is type(right) and all(same_value(getattr(left, name), getattr(right, name)) for name in names)
+
+
+def same_event(left: Event, right: Event) -> bool:
+    """The events have the same class and the same values."""
+    return same_fields(left, right)
