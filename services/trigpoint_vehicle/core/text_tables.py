@@ -16,6 +16,8 @@ Ints = NDArray[np.int64]
 
 WHITESPACE = "whitespace"
 MISSING = frozenset({"", "nan", "na", "n/a", "null", "none"})  # cells without a measurement, in any case
+EXACT_DIGITS = 15  # decimal digits float64 always keeps apart
+PLAIN_CHARACTERS = frozenset("0123456789.-")
 LIMITS_NS = (np.iinfo(np.int64).min, np.iinfo(np.int64).max)
 
 
@@ -45,11 +47,21 @@ class TextTable:
     def numbers(self, column: str) -> Floats:
         """The numbers of a column (n,), NaN where a cell is empty or says so. Raises InputError for anything else."""
         texts = self.texts(column)
-        return np.fromiter((self._number(row, column, text) for row, text in enumerate(texts)), dtype=np.float64)
+        try:
+            numbers = np.array(texts, dtype=np.str_).astype(np.float64)
+        except ValueError:
+            numbers = np.array([self._number(row, column, text) for row, text in enumerate(texts)])
+        infinite = np.flatnonzero(np.isinf(numbers))
+        if len(infinite):
+            raise self.refused(int(infinite[0]), column, "not a finite number")
+        return numbers
 
     def stamps_ns(self, column: str, *, unit_ns: int, epoch_ns: int) -> Ints:
         """Stamps (n,): exact decimals of a column times `unit_ns`, from `epoch_ns`. Raises InputError."""
         texts = self.texts(column)
+        exact = _exact_stamps_ns(texts, unit_ns)
+        if exact is not None:
+            return exact + epoch_ns
         stamps = (self._stamp_ns(row, column, text, unit_ns) + epoch_ns for row, text in enumerate(texts))
         return np.fromiter(stamps, dtype=np.int64)
 
@@ -60,14 +72,11 @@ class TextTable:
 
     def _number(self, row: int, column: str, text: str) -> float:
         try:
-            value = float(text)
+            return float(text)
         except ValueError:
-            if text.strip().lower() in MISSING:
+            if text.lower() in MISSING:
                 return math.nan
             raise self.refused(row, column, "not a number") from None
-        if math.isinf(value):
-            raise self.refused(row, column, "not a finite number")
-        return value
 
     def _stamp_ns(self, row: int, column: str, text: str, unit_ns: int) -> int:
         try:
@@ -79,10 +88,24 @@ class TextTable:
         return stamp_ns
 
 
+def _exact_stamps_ns(texts: tuple[str, ...], unit_ns: int) -> Ints | None:
+    # plain decimals short enough for float64 to hold every digit; None for anything else
+    decimals = max((len(text) - 1 - text.find(".") for text in texts if "." in text), default=0)
+    digits = max((len(text) for text in texts), default=0)
+    if digits > EXACT_DIGITS or unit_ns % 10**decimals or not set("".join(texts)) <= PLAIN_CHARACTERS:
+        return None
+    try:
+        counts = np.rint(np.array(texts, dtype=np.str_).astype(np.float64) * 10.0**decimals)
+    except ValueError:
+        return None
+    return counts.astype(np.int64) * (unit_ns // 10**decimals)
+
+
 def _split_rows(lines: Iterable[str], delimiter: str) -> Iterator[list[str]]:
     if delimiter == WHITESPACE:
         return (line.split() for line in lines)
-    return csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
+    rows = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
+    return ([cell.strip() for cell in row] for row in rows)
 
 
 def text_table(
@@ -96,7 +119,7 @@ def text_table(
     numbered = [(number, line) for number, line in enumerate(lines, start=1) if line.strip()]
     if comment:
         numbered = [(number, line) for number, line in numbered if not line.lstrip().startswith(comment)]
-    rows = [[cell.strip() for cell in row] for row in _split_rows((line for _, line in numbered), delimiter)]
+    rows = list(_split_rows((line for _, line in numbered), delimiter))
     line_number = [number for number, _ in numbered]
     names = tuple(columns)
     if not names:

@@ -90,11 +90,11 @@ class _Row:
 
 def _rows_of(truth: Truth) -> Iterator[_Row]:
     for path in truth.paths:
-        columns = zip(path.stamp_ns, path.lat_deg, path.lon_deg, path.heading_rad, strict=True)
-        yield from (_Row("pose", path.vehicle, *map(_plain, row), "") for row in columns)
+        known = _columns(path.stamp_ns, path.lat_deg, path.lon_deg, path.heading_rad)
+        yield from (_Row("pose", path.vehicle, int(t), lat, lon, heading, "") for t, lat, lon, heading in known)
     for fixes in truth.fixes:
-        known = zip(fixes.stamp_ns, fixes.lat_deg, fixes.lon_deg, fixes.state, strict=True)
-        yield from (_Row("fix", fixes.vehicle, int(t), float(lat), float(lon), math.nan, s) for t, lat, lon, s in known)
+        rows = zip(_columns(fixes.stamp_ns, fixes.lat_deg, fixes.lon_deg), fixes.state, strict=True)
+        yield from (_Row("fix", fixes.vehicle, int(t), lat, lon, math.nan, state) for (t, lat, lon), state in rows)
     for landmark in truth.landmarks:
         yield _Row(
             "landmark", landmark.landmark, 0, landmark.lat_deg, landmark.lon_deg, math.nan, landmark.signature
@@ -103,9 +103,8 @@ def _rows_of(truth: Truth) -> Iterator[_Row]:
         yield _Row("label", label.anchor, 0, label.lat_deg, label.lon_deg, math.nan, label.landmark)
 
 
-def _plain(value: "np.generic") -> "int | float":
-    plain: int | float = value.item()
-    return plain
+def _columns(*columns: Ints | Floats) -> Iterator[tuple[float, ...]]:
+    return zip(*(column.tolist() for column in columns), strict=True)
 
 
 def truth_lines(truth: Truth) -> Iterator[str]:
