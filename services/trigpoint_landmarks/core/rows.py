@@ -13,7 +13,7 @@ from trigpoint.events.envelope import LogPosition
 from trigpoint.events.mapped import AnchorAssociated, ImageOffsetSolved, LandmarkSolved, TrajectorySolved
 from trigpoint.geodesy.positions import Wgs84Position
 from trigpoint.geodesy.projection import MapFrame, map_from_wgs84, wgs84_from_map_points
-from trigpoint.geodesy.uncertainty import ellipse_of
+from trigpoint.geodesy.uncertainty import ellipses_of
 from trigpoint.landmarks.model import (
     Anchor,
     ImageOffset,
@@ -69,18 +69,18 @@ def landmark_rows(landmarks: Sequence[LandmarkSolved], frame: MapFrame) -> list[
     if not landmarks:
         return []
     points_m = np.array([row.position_m for row in landmarks], dtype=np.float64).reshape(-1, 2)
+    ellipses = ellipses_of(np.array([row.covariance_m2 for row in landmarks], dtype=np.float64).reshape(-1, 2, 2))
     lat_deg, lon_deg = wgs84_from_map_points(points_m, frame)
-    placed = zip(landmarks, points_m.tolist(), lat_deg.tolist(), lon_deg.tolist(), strict=True)
-    return [_landmark_row(row, point, Wgs84Position(lat, lon), frame) for row, point, lat, lon in placed]
+    placed = np.column_stack([points_m, lat_deg, lon_deg, ellipses]).tolist()
+    return [_landmark_row(row, place, frame) for row, place in zip(landmarks, placed, strict=True)]
 
 
 def _is_same(held: Landmark, solved: Landmark) -> bool:
     return replace(solved, valid_from_version=held.valid_from_version) == held
 
 
-def _landmark_row(row: LandmarkSolved, point_m: list[float], wgs84: Wgs84Position, frame: MapFrame) -> Landmark:
-    ellipse = ellipse_of(row.covariance_m2)
-    x_m, y_m = point_m
+def _landmark_row(row: LandmarkSolved, place: list[float], frame: MapFrame) -> Landmark:
+    x_m, y_m, lat_deg, lon_deg, sigma_major_m, sigma_minor_m, ellipse_heading_rad = place
     return Landmark(
         landmark=row.landmark,
         kind=row.kind,
@@ -89,14 +89,14 @@ def _landmark_row(row: LandmarkSolved, point_m: list[float], wgs84: Wgs84Positio
         y_m=y_m,
         easting_m=x_m + frame.origin_easting_m,
         northing_m=y_m + frame.origin_northing_m,
-        lat_deg=wgs84.lat_deg,
-        lon_deg=wgs84.lon_deg,
+        lat_deg=lat_deg,
+        lon_deg=lon_deg,
         variance_x_m2=float(row.covariance_m2[0, 0]),
         covariance_xy_m2=float(row.covariance_m2[0, 1]),
         variance_y_m2=float(row.covariance_m2[1, 1]),
-        sigma_major_m=ellipse.semi_major_m,
-        sigma_minor_m=ellipse.semi_minor_m,
-        ellipse_heading_rad=ellipse.heading_rad,
+        sigma_major_m=sigma_major_m,
+        sigma_minor_m=sigma_minor_m,
+        ellipse_heading_rad=ellipse_heading_rad,
         observation_count=row.observation_count,
         vehicles=row.vehicles,
         first_seen_ns=row.first_seen_ns,

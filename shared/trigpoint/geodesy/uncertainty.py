@@ -29,7 +29,14 @@ def floored_covariance(covariance: Floats, *, floor: float) -> Floats:
 
 def ellipse_of(covariance_m2: Floats) -> Ellipse:
     """The 1-sigma ellipse of a covariance (2, 2) in m^2, rows and columns east, north."""
-    values, vectors = np.linalg.eigh(0.5 * (covariance_m2 + covariance_m2.T))
-    major = vectors[:, 1]
-    semi = np.sqrt(np.maximum(values, 0.0))
-    return Ellipse(float(semi[1]), float(semi[0]), float(np.arctan2(major[1], major[0])))
+    semi_major_m, semi_minor_m, heading_rad = ellipses_of(covariance_m2[np.newaxis])[0]
+    return Ellipse(float(semi_major_m), float(semi_minor_m), float(heading_rad))
+
+
+def ellipses_of(covariance_m2: Floats) -> Floats:
+    """The 1-sigma ellipses (n, 3) of covariances (n, 2, 2) in m^2, rows and columns east, north: semi-major and
+    semi-minor axis in m, heading of the longer one in rad counter-clockwise from east."""
+    values, vectors = np.linalg.eigh(0.5 * (covariance_m2 + np.swapaxes(covariance_m2, -1, -2)))
+    semi_m = np.sqrt(np.maximum(values, 0.0))
+    heading_rad = np.arctan2(vectors[:, 1, 1], vectors[:, 0, 1])
+    return np.column_stack([semi_m[:, 1], semi_m[:, 0], heading_rad])

@@ -2,12 +2,14 @@
 
 import struct
 from collections.abc import Sequence
+from functools import lru_cache
 
 from trigpoint.errors import InputError
 
 Coordinates = tuple[tuple[float, float], ...]
 
 LITTLE_ENDIAN = 0b1
+EMPTY = 0b10000  # bit 4 of the flags
 ENVELOPE_XY = 0b10  # envelope indicator 1, bits 1 to 3 of the flags
 HEADER_SIZE = 8
 ENVELOPE_SIZES = (0, 32, 48, 48, 64)  # bytes, by envelope indicator
@@ -32,6 +34,18 @@ def encoded_line(points: Sequence[tuple[float, float]], *, srs_id: int) -> bytes
         b"GP", 0, LITTLE_ENDIAN | ENVELOPE_XY, srs_id, *envelope, 1, WKB_LINE_STRING, len(points)
     )
     return header + struct.pack(f"<{2 * len(points)}d", *(value for point in points for value in point))
+
+
+def decoded_point(blob: bytes) -> tuple[float, float]:
+    """The coordinates of a point geometry. Raises InputError for any other bytes."""
+    if len(blob) == _POINT.size:
+        magic, _, flags, _, _, kind, x, y = _POINT.unpack(blob)
+        if magic == b"GP" and flags == LITTLE_ENDIAN and kind == WKB_POINT:
+            return x, y
+    points = decoded(blob)
+    if len(points) != 1:
+        raise InputError(f"a geometry has {len(points)} points: a landmark is one")
+    return points[0]
 
 
 def decoded(blob: bytes) -> Coordinates:
@@ -62,24 +76,31 @@ def _decoded_wkb(blob: bytes, start: int) -> Coordinates:
 
 def min_x(blob: bytes) -> float:
     """The least x: what SQL knows as ST_MinX."""
-    return min(x for x, _ in decoded(blob))
+    return _bounds(blob)[0]
 
 
 def max_x(blob: bytes) -> float:
     """The greatest x: ST_MaxX."""
-    return max(x for x, _ in decoded(blob))
+    return _bounds(blob)[1]
 
 
 def min_y(blob: bytes) -> float:
     """The least y: ST_MinY."""
-    return min(y for _, y in decoded(blob))
+    return _bounds(blob)[2]
 
 
 def max_y(blob: bytes) -> float:
     """The greatest y: ST_MaxY."""
-    return max(y for _, y in decoded(blob))
+    return _bounds(blob)[3]
+
+
+@lru_cache(maxsize=16)  # a trigger asks four functions about one geometry
+def _bounds(blob: bytes) -> tuple[float, float, float, float]:
+    points = decoded(blob)
+    x, y = [point[0] for point in points], [point[1] for point in points]
+    return min(x), max(x), min(y), max(y)
 
 
 def is_empty(blob: bytes) -> bool:
-    """Whether a geometry has no point: ST_IsEmpty."""
-    return len(decoded(blob)) == 0
+    """Whether the header says that a geometry has no point: ST_IsEmpty."""
+    return bool(blob[3] & EMPTY)

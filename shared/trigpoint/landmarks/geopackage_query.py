@@ -1,5 +1,6 @@
 """Landmark queries as SQL on a GeoPackage: the area by its spatial index, everything else by columns."""
 
+import sqlite3
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -9,21 +10,18 @@ from sqlalchemy.dialects import sqlite
 
 from trigpoint.geodesy.projection import WGS84, transform_coordinates
 from trigpoint.landmarks import tables
-from trigpoint.landmarks.geopackage_geometry import decoded
 from trigpoint.landmarks.geopackage_schema import rtree_name
-from trigpoint.landmarks.model import Landmark
 from trigpoint.landmarks.queries import DegreeBox
-from trigpoint.landmarks.records import names_from_json
 
-EDGE_PIECES = 8  # an edge of a degree box is a curve on the grid: taken at this many places
-WINDOW_MARGIN = 0.01  # of the window's size: an edge of a degree bulges 4 m between two of them at 45 degrees
+EDGE_SHARE = np.linspace(0.0, 1.0, 5)  # an edge of a degree box is a curve on the grid: taken at these places
+EDGE_LON_SHARE = np.concatenate([EDGE_SHARE, EDGE_SHARE, np.zeros(5), np.ones(5)])
+EDGE_LAT_SHARE = np.concatenate([np.zeros(5), np.ones(5), EDGE_SHARE, EDGE_SHARE])
+WINDOW_MARGIN = 0.01  # of the window's size: an edge of a degree bulges 15 m between two places at 45 degrees
 WINDOW_MARGIN_M = 1.0  # the index keeps float32, rounded outwards, so no point is lost to rounding
 WIDEST_INDEXED_DEG = 5.0  # a map wider than that, or across the antimeridian, is searched without the index
 
-LandmarkRecord = tuple[
-    bytes, str, str, str, float, float, float, float, float, float, float, float, float, float,
-    int, str, int, int, int, str, str, int, int | None,
-]  # fmt: skip
+LANDMARK_TABLES = (tables.landmarks, tables.landmark_history)
+EXTENT_SQL = "SELECT min(lon_deg), min(lat_deg), max(lon_deg), max(lat_deg) FROM {table}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,14 +35,21 @@ class QueryShape:
     limited: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class MapExtent:
+    """Where all landmarks lie, and in which CRS the grid is."""
+
+    box: DegreeBox
+    crs: str
+
+
 def grid_window(box: DegreeBox, crs: str) -> dict[str, float]:
     """A window of the map's grid that holds the whole box: window_min_x and so on, in metres."""
-    share = np.linspace(0.0, 1.0, EDGE_PIECES + 1)
-    low, high = np.zeros_like(share), np.ones_like(share)
-    lon_deg = box.lon_min_deg + (box.lon_max_deg - box.lon_min_deg) * np.concatenate([share, share, low, high])
-    lat_deg = box.lat_min_deg + (box.lat_max_deg - box.lat_min_deg) * np.concatenate([low, high, share, share])
+    lon_deg = box.lon_min_deg + (box.lon_max_deg - box.lon_min_deg) * EDGE_LON_SHARE
+    lat_deg = box.lat_min_deg + (box.lat_max_deg - box.lat_min_deg) * EDGE_LAT_SHARE
     x_m, y_m = transform_coordinates(lon_deg, lat_deg, source_crs=WGS84, target_crs=crs)
-    min_x, max_x, min_y, max_y = float(x_m.min()), float(x_m.max()), float(y_m.min()), float(y_m.max())
+    x, y = x_m.tolist(), y_m.tolist()
+    min_x, max_x, min_y, max_y = min(x), max(x), min(y), max(y)
     margin_m = WINDOW_MARGIN_M + WINDOW_MARGIN * max(max_x - min_x, max_y - min_y)
     return {
         "window_min_x": min_x - margin_m,
@@ -52,6 +57,22 @@ def grid_window(box: DegreeBox, crs: str) -> dict[str, float]:
         "window_min_y": min_y - margin_m,
         "window_max_y": max_y + margin_m,
     }
+
+
+def held_extent(driver: sqlite3.Connection) -> MapExtent | None:
+    """The extent of all landmarks of all versions; None while there is none."""
+    boxes = [driver.execute(EXTENT_SQL.format(table=source.name)).fetchone() for source in LANDMARK_TABLES]
+    held = [box for box in boxes if box[0] is not None]
+    if not held:
+        return None
+    (crs,) = driver.execute("SELECT crs FROM map_versions").fetchone()
+    box = DegreeBox(
+        lon_min_deg=min(box[0] for box in held),
+        lat_min_deg=min(box[1] for box in held),
+        lon_max_deg=max(box[2] for box in held),
+        lat_max_deg=max(box[3] for box in held),
+    )
+    return MapExtent(box, crs)
 
 
 def clipped(box: DegreeBox, extent: DegreeBox) -> DegreeBox | None:
@@ -99,37 +120,3 @@ def landmark_sql(source: Table, shape: QueryShape) -> str:
     if shape.limited:
         statement = statement.order_by(columns.landmark).limit(bindparam("limit"))
     return str(statement.compile(dialect=sqlite.dialect(paramstyle="named")))
-
-
-def landmark_of(record: LandmarkRecord) -> Landmark:
-    """The landmark of a record of `landmark_sql`."""
-    ((easting_m, northing_m),) = decoded(record[0])
-    return Landmark(
-        landmark=record[1],
-        kind=record[2],
-        signature=record[3],
-        x_m=record[4],
-        y_m=record[5],
-        easting_m=easting_m,
-        northing_m=northing_m,
-        lat_deg=record[6],
-        lon_deg=record[7],
-        variance_x_m2=record[8],
-        covariance_xy_m2=record[9],
-        variance_y_m2=record[10],
-        sigma_major_m=record[11],
-        sigma_minor_m=record[12],
-        ellipse_heading_rad=record[13],
-        observation_count=record[14],
-        vehicles=names_from_json(record[15]),
-        first_seen_ns=record[16],
-        last_seen_ns=record[17],
-        anchored=bool(record[18]),
-        anchors=names_from_json(record[19]),
-        provenance=record[20],
-        valid_from_version=record[21],
-        valid_to_version=record[22],
-    )
-
-
-LANDMARK_TABLES = (tables.landmarks, tables.landmark_history)

@@ -1,11 +1,11 @@
 """The landmark store as one GeoPackage file, which QGIS and GDAL open as it is."""
 
+import sqlite3
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from sqlalchemy import Connection, Table, delete, insert, select, text
-from sqlalchemy.exc import IntegrityError
 
 from trigpoint.errors import InputError
 from trigpoint.landmarks import geopackage_schema as schema
@@ -14,13 +14,15 @@ from trigpoint.landmarks.geopackage_file import close, database_errors, driver_o
 from trigpoint.landmarks.geopackage_query import (
     LANDMARK_TABLES,
     WIDEST_INDEXED_DEG,
+    MapExtent,
     QueryShape,
     bound_box,
     clipped,
     grid_window,
-    landmark_of,
+    held_extent,
     landmark_sql,
 )
+from trigpoint.landmarks.geopackage_record import COLUMNS, INSERT_SQL, landmark_of, record_of
 from trigpoint.landmarks.model import Checkpoint, Landmark, LandmarkChanges, MapChange, MapRow, MapVersion
 from trigpoint.landmarks.queries import (
     DegreeBox,
@@ -33,7 +35,6 @@ from trigpoint.landmarks.queries import (
 )
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-EXTENT_SQL = "SELECT min(lon_deg), min(lat_deg), max(lon_deg), max(lat_deg) FROM {table}"
 
 Record = dict[str, object]
 
@@ -44,7 +45,7 @@ class GeoPackageStore:
     def __init__(self, path: Path, *, read_only: bool = False) -> None:
         self._path = path
         self._connection: Connection = opened(path, read_only=read_only)
-        self._extent: tuple[int, DegreeBox | None] | None = None
+        self._extent: tuple[int, MapExtent | None] | None = None
 
     def apply(self, change: MapChange, checkpoint: Checkpoint) -> None:
         """One map version and its checkpoint in one transaction."""
@@ -136,31 +137,17 @@ class GeoPackageStore:
     def _window(self, box: DegreeBox) -> dict[str, float] | None:
         """The grid window to look a box up in; None where the index cannot serve and columns must."""
         extent = self._held_extent()
-        inside = None if extent is None else clipped(box, extent)
-        if extent is None or inside is None or extent.lon_max_deg - extent.lon_min_deg > WIDEST_INDEXED_DEG:
+        inside = None if extent is None else clipped(box, extent.box)
+        if extent is None or inside is None or extent.box.lon_max_deg - extent.box.lon_min_deg > WIDEST_INDEXED_DEG:
             return None
-        crs = self._connection.scalar(select(tables.map_versions.c.crs).limit(1))
-        return grid_window(inside, str(crs))
+        return grid_window(inside, extent.crs)
 
-    def _held_extent(self) -> DegreeBox | None:
-        """The box of all landmarks of all versions, looked up anew whenever another process has written."""
+    def _held_extent(self) -> MapExtent | None:
+        """The map's extent, looked up anew whenever another process has written."""
         (data_version,) = driver_of(self._connection).execute("PRAGMA data_version").fetchone()
         if self._extent is None or self._extent[0] != data_version:
-            self._extent = (data_version, self._looked_up_extent())
+            self._extent = (data_version, held_extent(driver_of(self._connection)))
         return self._extent[1]
-
-    def _looked_up_extent(self) -> DegreeBox | None:
-        driver = driver_of(self._connection)
-        boxes = [driver.execute(EXTENT_SQL.format(table=source.name)).fetchone() for source in LANDMARK_TABLES]
-        held = [box for box in boxes if box[0] is not None]
-        if not held:
-            return None
-        return DegreeBox(
-            lon_min_deg=min(box[0] for box in held),
-            lat_min_deg=min(box[1] for box in held),
-            lon_max_deg=max(box[2] for box in held),
-            lat_max_deg=max(box[3] for box in held),
-        )
 
     def _adopt_crs(self, crs: str) -> None:
         reference = schema.spatial_reference_of(crs)
@@ -173,22 +160,26 @@ class GeoPackageStore:
         srs_id = schema.spatial_reference_of(change.version.crs).srs_id
         self._insert(tables.map_versions, [records.plain_record(change.version)])
         self._close_landmarks(change.closed, change.version.map_version)
-        try:
-            self._insert(tables.landmarks, [records.landmark_record(row, srs_id) for row in change.opened])
-        except IntegrityError as error:
-            raise InputError(f"map version {change.version.map_version}: {error.orig}: it is still valid") from error
+        self._open_landmarks(change, srs_id)
         self._insert(tables.trajectories, [records.trajectory_record(row, srs_id) for row in change.trajectories])
         self._insert(tables.anchors, [records.anchor_record(row, srs_id) for row in change.anchors])
         self._insert(tables.image_offsets, [records.plain_record(row) for row in change.image_offsets])
+
+    def _open_landmarks(self, change: MapChange, srs_id: int) -> None:
+        values = (record_of(landmark, srs_id=srs_id) for landmark in change.opened)
+        try:
+            driver_of(self._connection).executemany(INSERT_SQL, values)
+        except sqlite3.IntegrityError as error:
+            raise InputError(
+                f"map version {change.version.map_version} opens a landmark still valid: {error}"
+            ) from error
 
     def _insert(self, target: Table, rows: Sequence[Record]) -> None:
         if rows:
             self._connection.execute(insert(target), rows)
 
     def _close_landmarks(self, landmarks: Sequence[str], map_version: int) -> None:
-        table_columns = tuple(item.name for item in tables.landmarks.columns)
-        names = [name for name in table_columns if name not in ("fid", "valid_to_version")]
-        columns = ", ".join(names)
+        columns = ", ".join(name for name in COLUMNS if name != "valid_to_version")
         driver = driver_of(self._connection)
         moved = driver.executemany(
             f"INSERT INTO landmark_history ({columns}, valid_to_version) "

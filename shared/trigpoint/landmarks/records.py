@@ -5,13 +5,13 @@ from collections.abc import Mapping
 from dataclasses import fields
 from functools import lru_cache
 
-from trigpoint.landmarks.model import Anchor, ImageOffset, Landmark, MapVersion, Trajectory
+from trigpoint.landmarks.model import Anchor, ImageOffset, MapVersion, Trajectory
 
 Record = dict[str, object]
 Coordinates = tuple[tuple[float, float], ...]
 
 
-def _plain(row: Landmark | Trajectory | Anchor | ImageOffset | MapVersion, *without: str) -> Record:
+def _plain(row: Trajectory | Anchor | ImageOffset | MapVersion, *without: str) -> Record:
     return {field.name: getattr(row, field.name) for field in fields(row) if field.name not in without}
 
 
@@ -25,15 +25,6 @@ def names_from_json(names_json: str) -> tuple[str, ...]:
 def json_of_names(names: tuple[str, ...]) -> str:
     """A JSON list of names, as it is read by a person."""
     return json.dumps(names, ensure_ascii=False)
-
-
-def landmark_record(landmark: Landmark, srs_id: int) -> Record:
-    """The record of a landmark."""
-    return _plain(landmark, "easting_m", "northing_m") | {
-        "geom": (srs_id, ((landmark.easting_m, landmark.northing_m),)),
-        "vehicles": json_of_names(landmark.vehicles),
-        "anchors": json_of_names(landmark.anchors),
-    }
 
 
 def trajectory_record(trajectory: Trajectory, srs_id: int) -> Record:

@@ -1,0 +1,1 @@
+"""Hand-made map versions, for the tests of the landmark database."""
