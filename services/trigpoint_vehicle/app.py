@@ -13,6 +13,8 @@ from trigpoint_vehicle.core.anchors_geojson import anchors_geojson
 from trigpoint_vehicle.core.campus import conversion_of, simulate_campus
 from trigpoint_vehicle.core.mrclam import BARCODES, LANDMARKS, RobotSources, mrclam, robot_files, robot_numbers
 from trigpoint_vehicle.core.recording import Conversion
+from trigpoint_vehicle.core.table_manifest import parsed_manifest
+from trigpoint_vehicle.core.table_rows import converted_tables
 from trigpoint_vehicle.core.text_tables import SourceText
 from trigpoint_vehicle.core.victoria_park import GPS, INPUTS, MEASUREMENTS, victoria_park
 from trigpoint_vehicle.settings import SimulationSettings
@@ -89,6 +91,16 @@ def convert_mrclam(source: Path, out_dir: Path) -> Written:
 def _robot_sources(source: Path, robot: int) -> RobotSources:
     odometry, measurement, truth = (read_source(source, name) for name in robot_files(robot))
     return RobotSources(robot=robot, odometry=odometry, measurement=measurement, truth=truth)
+
+
+def convert_table(manifest_path: Path, out_dir: Path, *, data_dir: Path | None = None) -> Written:
+    """The tables a manifest describes as logs, truth and anchors; `data_dir` replaces the manifest's. Raises InputError."""
+    text = read_source(manifest_path.parent, manifest_path.name)
+    manifest = parsed_manifest(text.name, text.text)
+    folder = data_dir or manifest_path.parent / manifest.data_dir
+    names = tqdm(manifest.files(), desc="reading", unit="file", disable=None)
+    sources = [read_source(folder, name) for name in names]
+    return write_conversion(converted_tables(manifest, text.text, sources), out_dir)
 
 
 def record_campus(settings: SimulationSettings, out_dir: Path) -> Written:
