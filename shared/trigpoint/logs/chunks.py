@@ -24,6 +24,7 @@ FRAME = struct.Struct("<BQ")  # opcode and length of any record
 MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 MESSAGE_FIXED_BYTES = MESSAGE.size - FRAME.size
 COMPRESSION = "zstd"
+CHUNK_LIMIT_BYTES = 1 << 30  # what a damaged header may make us allocate; writers use some megabytes
 COMPRESSION_LEVEL = 3  # zstd's own default: the ratio hardly grows above it on packed doubles
 
 
@@ -120,8 +121,12 @@ def _chunk(data: bytes, stamps_ns: Sequence[int]) -> Chunk:
 
 
 def unpacked(chunk: Chunk) -> bytes:
-    """The chunk's records, checked. Raises LogDamaged for a wrong checksum or size."""
+    """The chunk's records, checked. Raises LogDamaged for a wrong checksum or size, or more than CHUNK_LIMIT_BYTES."""
     try:
+        compressed = chunk.compression == COMPRESSION
+        said = (chunk.uncompressed_size, zstandard.frame_content_size(chunk.data) if compressed else 0)
+        if max(said) > CHUNK_LIMIT_BYTES:
+            raise LogDamaged(f"chunk says it holds {max(said)} bytes, at most {CHUNK_LIMIT_BYTES} are unpacked")
         stream, size = get_chunk_data_stream(chunk, validate_crc=False)
         data: bytes = stream.read(size)
     except (McapError, zstandard.ZstdError, RuntimeError, EOFError) as error:

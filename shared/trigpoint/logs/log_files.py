@@ -59,15 +59,27 @@ def _catalog_chunks(scan: McapScan, first_number: int) -> Iterator[CatalogChunk]
 
 
 def bring_up_to_date(catalog: Catalog, folder: Path, stream: str) -> None:
-    """The catalog says of a stream what its files say: those whose size it does not know are read."""
+    """The catalog says of a stream what its files say: those whose size it does not know are read.
+
+    A file that lost chunks the catalog knows stays as it was there: reading it names what is gone.
+    """
     known = {file.first_number: file for file in catalog.files(stream)}
     there = file_numbers(folder)
     for first_number in there:
         size_bytes = file_path(folder, first_number).stat().st_size
         if first_number not in known or known[first_number].size_bytes != size_bytes:
-            catalog.replace(entry_of(folder, stream, first_number))
+            entry = entry_of(folder, stream, first_number)
+            if not lost_chunks(catalog, entry):
+                catalog.replace(entry)
     for gone in known.keys() - set(there):
         catalog.remove(known[gone])
+
+
+def lost_chunks(catalog: Catalog, entry: CatalogEntry) -> tuple[CatalogChunk, ...]:
+    """Chunks of a file that the catalog knows, so that they were durable once, and the file has no more."""
+    first_number = entry.file.first_number
+    known = catalog.chunks(entry.file.stream, first_number=first_number)
+    return tuple(chunk for chunk in known if chunk.first_number == first_number)[len(entry.chunks) :]
 
 
 def mend(catalog: Catalog, folder: Path, stream: str) -> None:
@@ -85,12 +97,8 @@ def _mend_file(catalog: Catalog, folder: Path, file: CatalogFile) -> None:
     entry = entry_of(folder, file.stream, file.first_number)
     if entry.file.damage:
         raise LogDamaged(f"{entry.file.damage}: not mended, since more than its tail is damaged")
-    acknowledged = [chunk for chunk in catalog.chunks(file.stream) if chunk.first_number == file.first_number]
-    if len(acknowledged) > len(entry.chunks):
-        lost = acknowledged[len(entry.chunks)]
-        raise LogDamaged(
-            f"{path}, byte {lost.offset}: events from number {lost.number} on were acknowledged and are lost"
-        )
+    for lost in lost_chunks(catalog, entry)[:1]:
+        raise LogDamaged(f"{path}, byte {lost.offset}: events from number {lost.number} on were durable and are gone")
     if not entry.chunks:
         path.unlink()
         catalog.remove(file)

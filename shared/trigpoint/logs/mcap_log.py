@@ -74,8 +74,7 @@ class McapLog:
         self._catalog = Catalog(directory / NAME)
         self._writers: dict[str, StreamWriter] = {}
         self._lock = threading.RLock()
-        for folder in self._folders():
-            bring_up_to_date(self._catalog, folder, folder.name)
+        self._bring_all_up_to_date()
 
     def describe(self, frame: MapFramePinned) -> None:
         """Files begun from now on name the map's frame in their metadata."""
@@ -163,8 +162,7 @@ class McapLog:
 
     def streams(self) -> tuple[str, ...]:
         """The names of all streams that hold an event, sorted."""
-        for folder in self._folders():
-            bring_up_to_date(self._catalog, folder, folder.name)
+        self._bring_all_up_to_date()
         return self._catalog.streams()
 
     def next_number(self, stream: str) -> int:
@@ -190,8 +188,10 @@ class McapLog:
     def _bring_up_to_date(self, stream: str) -> None:
         bring_up_to_date(self._catalog, self.directory / valid_stream(stream), stream)
 
-    def _folders(self) -> tuple[Path, ...]:
-        return tuple(sorted(path for path in self.directory.iterdir() if path.is_dir()))
+    def _bring_all_up_to_date(self) -> None:
+        there = {path.name for path in self.directory.iterdir() if path.is_dir() and not path.name.startswith(".")}
+        for stream in sorted(there | set(self._catalog.streams())):
+            self._bring_up_to_date(stream)
 
 
 def _chunk_data(file: BinaryIO, path: Path, chunk: CatalogChunk) -> bytes:

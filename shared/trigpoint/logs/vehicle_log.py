@@ -44,8 +44,9 @@ def write_vehicle_log(path: Path, rows: Iterable[Envelope[Observed]], *, vehicle
             os.fsync(file.fileno())
         partial.replace(path)
     except OSError as error:
-        partial.unlink(missing_ok=True)
         raise AppendFailed(f"{path}: vehicle log not written: {error}") from error
+    finally:
+        partial.unlink(missing_ok=True)
     return count
 
 
