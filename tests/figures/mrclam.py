@@ -6,7 +6,7 @@ from figures.figure import Figure, Measurement, at_most
 from figures.workbench import Outcome, Workbench
 
 DRAWS = 100
-ROBOTS = tuple(f"robot-{number}" for number in range(1, 6))
+ROBOTS = tuple(f"robot{number}" for number in range(1, 6))
 
 
 def built(bench: Workbench) -> Outcome:

@@ -13,7 +13,7 @@ def cold_start(bench: Workbench) -> tuple[Outcome, ...]:
     raw, data = bench.path("raw"), bench.path("data")
     return (
         bench.run("convert", "victoria-park", bench.drive("victoria_park"), raw),
-        bench.run("ingest", f"{raw}/victoria-park.mcap", "--data", data),
+        bench.run("ingest", f"{raw}/utecar.mcap", "--data", data),
         bench.run("build", "--data", data, "--json"),
     )
 
