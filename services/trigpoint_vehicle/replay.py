@@ -5,14 +5,17 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
 
 from trigpoint.bus.ports import Bus, BusMessage, Subscription
 from trigpoint.errors import InputError, ServiceError
-from trigpoint.events.codec import encode
+from trigpoint.events.codec import encode, event_class
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.keys import DEFAULT_ROOT
 from trigpoint.events.observed import Observed
-from trigpoint.events.uplink import acknowledgement_key, uplink_key_of
+from trigpoint.events.uplink import acknowledgement_key, uplink_key
+from trigpoint.logs.vehicle_log import RawMessage, read_vehicle_log
 
 LISTENER_POLL_S = 0.002  # how often to look whether ingest is there yet
 
@@ -41,7 +44,7 @@ class ReplayReport:
     resent: int
 
 
-class _Replay:
+class _UnderWay:
     """One vehicle's messages under way: those sent and not yet acknowledged, oldest first."""
 
     def __init__(self, bus: Bus, acknowledgements: Subscription, settings: ReplaySettings) -> None:
@@ -104,6 +107,22 @@ def _covers(acknowledged: EventIdentity, sent: EventIdentity) -> bool:
     return acknowledged.boot_id == sent.boot_id and acknowledged.sequence >= sent.sequence
 
 
+def replay_log(
+    path: Path,
+    bus: Bus,
+    *,
+    settings: ReplaySettings | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> ReplayReport:
+    """Every whole message of a vehicle's log sent as it is, all of them acknowledged; `progress` hears of each one.
+
+    Raises LogDamaged, after the whole ones are sent, for a damaged file, InputError for one without a message,
+    ServiceError if nobody listens or acknowledges.
+    """
+    chosen = settings if settings is not None else ReplaySettings()
+    return _replay(_recorded(read_vehicle_log(path), chosen.root), bus, chosen, progress)
+
+
 def replay_rows(
     rows: Iterable[Envelope[Observed]],
     bus: Bus,
@@ -111,41 +130,51 @@ def replay_rows(
     settings: ReplaySettings | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> ReplayReport:
-    """One vehicle's events sent in order, all of them acknowledged; `progress` hears of each one sent.
+    """One vehicle's events sent in order, all of them acknowledged; `progress` hears of each one.
 
-    Raises InputError for rows of no vehicle, ServiceError if nobody listens or acknowledges.
+    Raises InputError if there are none, ServiceError if nobody listens or acknowledges.
     """
     chosen = settings if settings is not None else ReplaySettings()
-    messages = _messages(rows, chosen.root)
+    return _replay(_encoded(rows, chosen.root), bus, chosen, progress)
+
+
+def _replay(
+    messages: Iterator[BusMessage], bus: Bus, settings: ReplaySettings, progress: Callable[[int], None] | None
+) -> ReplayReport:
     first = next(messages, None)
     if first is None:
-        raise InputError("no event to replay: at least a VehicleDescribed is needed")
+        raise InputError("no message to replay: a drive has at least its VehicleDescribed")
     vehicle = first.identity.source
-    acknowledgements = bus.subscribe(acknowledgement_key(vehicle, root=chosen.root))
+    acknowledgements = bus.subscribe(acknowledgement_key(vehicle, root=settings.root))
     try:
-        _await_listener(bus, first.key, chosen.listener_timeout_s)
-        replay = _Replay(bus, acknowledgements, chosen)
-        replay.send(first)
-        for message in messages:
-            replay.send(message)
+        _await_listener(bus, first.key, settings.listener_timeout_s)
+        under_way = _UnderWay(bus, acknowledgements, settings)
+        for message in chain((first,), messages):
+            under_way.send(message)
             if progress is not None:
                 progress(1)
-        replay.finish()
+        under_way.finish()
     finally:
         acknowledgements.close()
-    return ReplayReport(vehicle=vehicle, messages=replay.sent, resent=replay.resent)
+    return ReplayReport(vehicle=vehicle, messages=under_way.sent, resent=under_way.resent)
 
 
-def _messages(rows: Iterable[Envelope[Observed]], root: str) -> Iterator[BusMessage]:
-    keys: dict[type, str] = {}
+def _recorded(messages: Iterable[RawMessage], root: str) -> Iterator[BusMessage]:
+    for message in messages:
+        yield BusMessage(
+            key=uplink_key(message.identity.source, event_class(message.schema_name), root=root),
+            schema_name=message.schema_name,
+            payload=message.payload,
+            identity=message.identity,
+            stamp_ns=message.stamp_ns,
+        )
+
+
+def _encoded(rows: Iterable[Envelope[Observed]], root: str) -> Iterator[BusMessage]:
     for envelope in rows:
         schema_name, payload = encode(envelope.event)
-        kind = type(envelope.event)
-        key = keys.get(kind)
-        if key is None:
-            key = keys[kind] = uplink_key_of(envelope, root=root)
         yield BusMessage(
-            key=key,
+            key=uplink_key(envelope.identity.source, type(envelope.event), root=root),
             schema_name=schema_name,
             payload=payload,
             identity=envelope.identity,

@@ -4,17 +4,27 @@ What a vehicle sends is not yet an event: it may be lost, sent twice or refused.
 so that whoever subscribes to `…/obs/…` hears only what is in the log.
 """
 
-from trigpoint.events.envelope import Envelope
-from trigpoint.events.keys import DEFAULT_ROOT, KEY_VERSION, key_of, valid_name
+from trigpoint.errors import InputError
+from trigpoint.events.keys import DEFAULT_ROOT, KEY_PATTERNS, KEY_VERSION, valid_name
+
+OBSERVED, SENT = "/obs/", "/up/"
+UNKNOWN_PATTERN = "veh/{vehicle}/obs/unknown"
 
 ACKNOWLEDGEMENT_SCHEMA = "trigpoint.v1.Acknowledgement"
 """An empty message: its identity (vehicle, boot, sequence) says it all. Every message of that boot up to and
 including the sequence was made durable or refused for good; sequence -1 for none yet."""
 
 
-def uplink_key_of(envelope: Envelope[object], *, root: str = DEFAULT_ROOT) -> str:
-    """The key a vehicle sends an observation on. Raises InputError for a name that cannot be a chunk of a key."""
-    return key_of(envelope, root=root).replace("/obs/", "/up/", 1)
+def uplink_key(vehicle: str, event_class: type | None, *, root: str = DEFAULT_ROOT) -> str:
+    """The key a vehicle sends its observations of a class on, None for what no class is known for.
+
+    Raises InputError for a name that cannot be a chunk of a key, and for a class that vehicles do not send.
+    """
+    pattern = KEY_PATTERNS[event_class] if event_class is not None else UNKNOWN_PATTERN
+    if OBSERVED not in pattern:
+        raise InputError(f"{pattern} is not sent by vehicles: only {OBSERVED} is")
+    chunks = pattern.replace(OBSERVED, SENT, 1).format(vehicle=valid_name(vehicle))
+    return f"{valid_name(root)}/{KEY_VERSION}/{chunks}"
 
 
 def uplink_expression(*, root: str = DEFAULT_ROOT) -> str:
