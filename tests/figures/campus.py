@@ -6,6 +6,7 @@ from figures.figure import Bounds, Figure, Measurement, at_most, between
 from figures.workbench import Outcome, Workbench
 
 SEEDS = range(10)
+MOST_LABELLED = ("--image", "most-labelled")  # the quadrangle: 30 of the 50 labels
 DRAWS = 100
 CURVE_DRAWS = 1000
 
