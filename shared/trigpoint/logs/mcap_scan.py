@@ -214,8 +214,7 @@ class McapScan:
         held = content.checksum(start, content.size_bytes - len(MAGIC) - 4)
         if footer.summary_crc not in (0, held):
             return f"summary has checksum {held:08x}, the footer says {footer.summary_crc:08x}"
-        end_of_data = content.read(start - DATA_END_BYTES, start)
-        if end_of_data[:1] != bytes([Opcode.DATA_END]):
+        if content.read(start - DATA_END_BYTES, start - 4) != FRAME.pack(Opcode.DATA_END, 4):
             return f"summary starts at {start}, no end of a data section stands before it"
         self._learn(content.read(start, footer_start))
         self._channels_settled = bool(self.channels)

@@ -1,3 +1,4 @@
+import shutil
 import subprocess
 import sys
 from contextlib import closing
@@ -24,14 +25,21 @@ os.kill(os.getpid(), signal.SIGKILL)
 """
 
 
-@pytest.fixture
-def crashed(tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def killed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A log whose writer was killed after 80 acknowledged events."""
+    directory = tmp_path_factory.mktemp("killed")
     import_paths = ":".join(path for path in sys.path if path)
-    command = [sys.executable, "-c", WRITES_UNTIL_KILLED, str(tmp_path)]
+    command = [sys.executable, "-c", WRITES_UNTIL_KILLED, str(directory)]
     killed = subprocess.run(command, env={"PYTHONPATH": import_paths}, check=False, timeout=60)
     assert killed.returncode == -9
-    return tmp_path
+    return directory
+
+
+@pytest.fixture
+def crashed(killed: Path, tmp_path: Path) -> Path:
+    """A copy of it, to be written to."""
+    return Path(shutil.copytree(killed, tmp_path / "crashed"))
 
 
 def _file(directory: Path) -> Path:
