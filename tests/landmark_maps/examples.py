@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from trigpoint.events.corrected import AnchorLabelled
-from trigpoint.events.envelope import Envelope, EventIdentity
+from trigpoint.events.envelope import Envelope, EventIdentity, LogPosition
 from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.mapped import (
     AnchorAssociated,
@@ -21,6 +21,8 @@ from trigpoint.geodesy.positions import GridPosition, MapPosition
 from trigpoint.geodesy.projection import MapFrame, pin_map_frame, wgs84_from_map
 from trigpoint.landmarks.model import Checkpoint, Landmark, MapChange, MapVersion
 from trigpoint.logs.ports import EventLog
+from trigpoint_landmarks.core.rows import map_change
+from trigpoint_landmarks.core.versions import solved_versions
 
 CRS = "EPSG:32756"
 ORIGIN = GridPosition(332_000.0, 6_248_000.0)
@@ -218,3 +220,14 @@ def pin_frame(log: EventLog) -> None:
         crs=CRS, origin_easting_m=ORIGIN.easting_m, origin_northing_m=ORIGIN.northing_m, declared_by="test"
     )
     log.append(FRAME_STREAM, [Envelope(EventIdentity("trigpoint_ingest", "boot-1", 0), START_NS, event)])
+
+
+def whole_change(map_version: int = 1) -> MapChange:
+    """A map version with something in every table, as the service makes it from events."""
+    events = solved_map(map_version, [solved_landmark("L1", 1.5, 2.5, map_version=map_version)], labels=1)
+    rows = [
+        (LogPosition(MAP_STREAM, number), Envelope(EventIdentity("optimisation", "boot-1", number), START_NS, event))
+        for number, event in enumerate(events)
+    ]
+    (version,) = solved_versions(rows)
+    return map_change(version, frame=frame(), labels={"anchor-1": label("anchor-1")}, valid={})

@@ -118,5 +118,6 @@ def landmark_sql(source: Table, shape: QueryShape) -> str:
         statement = statement.where(columns.valid_from_version <= bindparam("as_of"))
         statement = statement.where(or_(ends.is_(None), ends > bindparam("as_of")))
     if shape.limited:
-        statement = statement.order_by(columns.landmark).limit(bindparam("limit"))
-    return str(statement.compile(dialect=sqlite.dialect(paramstyle="named")))
+        statement = statement.order_by(columns.landmark)
+    sql = str(statement.compile(dialect=sqlite.dialect(paramstyle="named")))
+    return f"{sql} LIMIT :limit" if shape.limited else sql

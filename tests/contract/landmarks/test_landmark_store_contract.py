@@ -1,0 +1,238 @@
+"""What every landmark store promises; each joins by a line in `stores`."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from landmark_maps import examples
+from landmark_maps.examples import change, checkpoint, landmark
+from trigpoint.errors import InputError
+from trigpoint.landmarks.geopackage_store import GeoPackageStore
+from trigpoint.landmarks.memory_store import MemoryStore
+from trigpoint.landmarks.model import Checkpoint, Landmark, LandmarkChanges
+from trigpoint.landmarks.ports import LandmarkStore
+from trigpoint.landmarks.queries import DegreeBox, Disc, LandmarkQuery
+
+EVERYWHERE = DegreeBox(lon_min_deg=-180.0, lat_min_deg=-90.0, lon_max_deg=180.0, lat_max_deg=90.0)
+
+
+@pytest.fixture(params=["memory", "geopackage"])
+def store(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[LandmarkStore]:
+    opened: LandmarkStore = MemoryStore() if request.param == "memory" else GeoPackageStore(tmp_path / "map.gpkg")
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def moved(store: LandmarkStore) -> LandmarkStore:
+    """Version 1 has A and B, version 2 has A as it was, B moved by 1 m, and C; version 3 has no A."""
+    a, b, c = landmark("A", 0.0, 0.0), landmark("B", 100.0, 0.0), landmark("C", 0.0, 100.0, kind="corner")
+    store.apply(change(1, opened=[a, b]), checkpoint(10))
+    store.apply(change(2, opened=[landmark("B", 101.0, 0.0), c], closed=["B"]), checkpoint(20))
+    store.apply(change(3, closed=["A"]), checkpoint(30))
+    return store
+
+
+def ids(landmarks: tuple[Landmark, ...]) -> list[str]:
+    return [row.landmark for row in landmarks]
+
+
+def box_of(x_min_m: float, y_min_m: float, x_max_m: float, y_max_m: float) -> DegreeBox:
+    """A degree box through two corners given in the map frame."""
+    low, high = landmark("low", x_min_m, y_min_m), landmark("high", x_max_m, y_max_m)
+    return DegreeBox(
+        lon_min_deg=low.lon_deg, lat_min_deg=low.lat_deg, lon_max_deg=high.lon_deg, lat_max_deg=high.lat_deg
+    )
+
+
+def test_a_new_store_is_empty(store: LandmarkStore) -> None:
+    assert store.landmarks(LandmarkQuery()) == ()
+    assert store.map_versions() == ()
+    assert store.checkpoint() == Checkpoint()
+    assert list(store.rows()) == []
+
+
+def test_a_landmark_comes_back_exactly_as_it_was_applied(store: LandmarkStore) -> None:
+    given = landmark("Pfahl 7/ü", 12.345678901234567, -0.1)
+    store.apply(change(1, opened=[given]), checkpoint(1))
+    assert store.landmarks(LandmarkQuery()) == (given,)
+
+
+def test_a_version_comes_back_exactly_as_it_was_applied(store: LandmarkStore) -> None:
+    applied = change(1, opened=[landmark("A", 0.0, 0.0)])
+    store.apply(applied, checkpoint(1))
+    assert store.map_versions() == (applied.version,)
+
+
+def test_the_checkpoint_moves_with_the_version(moved: LandmarkStore) -> None:
+    assert moved.checkpoint() == checkpoint(30)
+
+
+def test_the_newest_version_is_answered_unless_another_is_asked_for(moved: LandmarkStore) -> None:
+    assert ids(moved.landmarks(LandmarkQuery())) == ["B", "C"]
+
+
+@pytest.mark.parametrize(("as_of", "expected"), [(1, ["A", "B"]), (2, ["A", "B", "C"]), (3, ["B", "C"])])
+def test_every_version_is_kept(moved: LandmarkStore, as_of: int, expected: list[str]) -> None:
+    assert ids(moved.landmarks(LandmarkQuery(as_of=as_of))) == expected
+
+
+def test_an_older_version_has_the_older_position(moved: LandmarkStore) -> None:
+    (old,) = [row for row in moved.landmarks(LandmarkQuery(as_of=1)) if row.landmark == "B"]
+    assert (old.x_m, old.valid_from_version, old.valid_to_version) == (100.0, 1, 2)
+
+
+def test_a_landmark_neither_opened_nor_closed_keeps_its_row(moved: LandmarkStore) -> None:
+    (kept,) = [row for row in moved.landmarks(LandmarkQuery(as_of=2)) if row.landmark == "A"]
+    assert (kept.valid_from_version, kept.valid_to_version) == (1, 3)
+
+
+@pytest.mark.parametrize("as_of", [0, 4, -1])
+def test_an_unknown_version_is_refused_with_the_known_ones(moved: LandmarkStore, as_of: int) -> None:
+    with pytest.raises(InputError, match=f"map version {as_of} is unknown: 1 to 3 are there"):
+        moved.landmarks(LandmarkQuery(as_of=as_of))
+
+
+def test_any_version_of_an_empty_store_is_refused(store: LandmarkStore) -> None:
+    with pytest.raises(InputError, match="map version 1 is unknown: no version is there yet"):
+        store.landmarks(LandmarkQuery(as_of=1))
+
+
+def test_a_bbox_finds_what_lies_in_it_and_nothing_else(moved: LandmarkStore) -> None:
+    assert ids(moved.landmarks(LandmarkQuery(bbox=box_of(50.0, -20.0, 150.0, 20.0)))) == ["B"]
+
+
+def test_a_bbox_holds_its_edges(moved: LandmarkStore) -> None:
+    b = landmark("B", 101.0, 0.0)
+    edge = DegreeBox(lon_min_deg=b.lon_deg, lat_min_deg=b.lat_deg, lon_max_deg=b.lon_deg, lat_max_deg=b.lat_deg)
+    assert ids(moved.landmarks(LandmarkQuery(bbox=edge))) == ["B"]
+
+
+def test_a_bbox_of_the_whole_earth_finds_everything(moved: LandmarkStore) -> None:
+    assert ids(moved.landmarks(LandmarkQuery(bbox=EVERYWHERE))) == ["B", "C"]
+
+
+def test_a_bbox_on_the_other_side_of_the_earth_finds_nothing(moved: LandmarkStore) -> None:
+    elsewhere = DegreeBox(lon_min_deg=-30.0, lat_min_deg=30.0, lon_max_deg=-29.0, lat_max_deg=31.0)
+    assert moved.landmarks(LandmarkQuery(bbox=elsewhere)) == ()
+
+
+def test_a_bbox_asks_the_version_that_is_asked_for(moved: LandmarkStore) -> None:
+    beside = box_of(99.5, -20.0, 100.5, 20.0)
+    assert ids(moved.landmarks(LandmarkQuery(bbox=beside, as_of=1))) == ["B"]
+    assert moved.landmarks(LandmarkQuery(bbox=beside)) == ()
+
+
+def test_near_is_in_order_of_distance(store: LandmarkStore) -> None:
+    store.apply(
+        change(1, opened=[landmark("A", 30.0, 0.0), landmark("B", 0.0, 10.0), landmark("C", -20.0, 0.0)]), checkpoint(1)
+    )
+    here = landmark("here", 0.0, 0.0)
+    found = store.landmarks(LandmarkQuery(near=Disc(lat_deg=here.lat_deg, lon_deg=here.lon_deg, radius_m=25.0)))
+    assert ids(found) == ["B", "C"]
+
+
+def test_the_radius_is_in_true_metres_not_in_metres_of_the_grid(store: LandmarkStore) -> None:
+    # 300 km from the central meridian of zone 56 the grid is stretched by 507 ppm: 1000.0 grid m are 999.49 true m.
+    store.apply(change(1, opened=[landmark("A", 469_000.0, 0.0)]), checkpoint(1))
+    here = landmark("here", 468_000.0, 0.0)
+    disc = Disc(lat_deg=here.lat_deg, lon_deg=here.lon_deg, radius_m=999.75)
+    assert ids(store.landmarks(LandmarkQuery(near=disc))) == ["A"]
+
+
+def test_a_limit_keeps_the_nearest(moved: LandmarkStore) -> None:
+    here = landmark("here", 0.0, 90.0)
+    disc = Disc(lat_deg=here.lat_deg, lon_deg=here.lon_deg, radius_m=500.0)
+    assert ids(moved.landmarks(LandmarkQuery(near=disc, limit=1))) == ["C"]
+
+
+def test_a_limit_without_an_area_keeps_the_first_ids(moved: LandmarkStore) -> None:
+    assert ids(moved.landmarks(LandmarkQuery(as_of=2, limit=2))) == ["A", "B"]
+
+
+def test_a_kind_is_asked_for_by_name(moved: LandmarkStore) -> None:
+    assert ids(moved.landmarks(LandmarkQuery(kind="corner"))) == ["C"]
+
+
+def test_conditions_hold_together(moved: LandmarkStore) -> None:
+    here = landmark("here", 0.0, 0.0)
+    disc = Disc(lat_deg=here.lat_deg, lon_deg=here.lon_deg, radius_m=500.0)
+    query = LandmarkQuery(bbox=box_of(-50.0, -50.0, 50.0, 150.0), near=disc, kind="pole", as_of=2)
+    assert ids(moved.landmarks(query)) == ["A"]
+
+
+def test_changes_name_what_is_new_moved_and_gone(moved: LandmarkStore) -> None:
+    changes = moved.changes(LandmarkQuery(), since=1)
+    assert (ids(changes.changed), changes.removed, changes.as_of) == (["B", "C"], ("A",), 3)
+
+
+def test_changes_up_to_a_version_stop_there(moved: LandmarkStore) -> None:
+    changes = moved.changes(LandmarkQuery(as_of=2), since=1)
+    assert (ids(changes.changed), changes.removed) == (["B", "C"], ())
+
+
+def test_nothing_changed_since_the_newest_version(moved: LandmarkStore) -> None:
+    assert moved.changes(LandmarkQuery(), since=3) == LandmarkChanges(since=3, as_of=3, changed=(), removed=())
+
+
+def test_a_landmark_that_left_the_area_is_removed_from_it(moved: LandmarkStore) -> None:
+    changes = moved.changes(LandmarkQuery(bbox=box_of(99.0, -20.0, 100.5, 20.0)), since=1)
+    assert (changes.changed, changes.removed) == ((), ("B",))
+
+
+def test_changes_since_an_unknown_version_are_refused(moved: LandmarkStore) -> None:
+    with pytest.raises(InputError, match="map version 7 is unknown: 1 to 3 are there"):
+        moved.changes(LandmarkQuery(), since=7)
+
+
+def test_changes_with_a_limit_are_refused(moved: LandmarkStore) -> None:
+    with pytest.raises(InputError, match="limit 5"):
+        moved.changes(LandmarkQuery(limit=5), since=1)
+
+
+@pytest.mark.parametrize("map_version", [3, 2])
+def test_a_version_not_after_the_last_is_refused_and_changes_nothing(moved: LandmarkStore, map_version: int) -> None:
+    before = set(moved.rows())
+    with pytest.raises(InputError, match=f"map version {map_version}: 3 was already applied"):
+        moved.apply(change(map_version, opened=[landmark("D", 0.0, 0.0)]), checkpoint(99))
+    assert (set(moved.rows()), moved.checkpoint()) == (before, checkpoint(30))
+
+
+def test_a_version_in_another_crs_is_refused_and_changes_nothing(moved: LandmarkStore) -> None:
+    before = set(moved.rows())
+    with pytest.raises(InputError, match="EPSG:32755.*the map is in EPSG:32756"):
+        moved.apply(change(4, crs="EPSG:32755"), checkpoint(99))
+    assert (set(moved.rows()), moved.checkpoint()) == (before, checkpoint(30))
+
+
+def test_closing_what_is_not_valid_is_refused_and_changes_nothing(moved: LandmarkStore) -> None:
+    before = set(moved.rows())
+    with pytest.raises(InputError, match="map version 4 closes 2 landmarks: 1 are valid"):
+        moved.apply(change(4, opened=[landmark("D", 0.0, 0.0)], closed=["B", "A"]), checkpoint(99))
+    assert (set(moved.rows()), moved.checkpoint()) == (before, checkpoint(30))
+
+
+def test_opening_what_is_still_valid_is_refused_and_changes_nothing(moved: LandmarkStore) -> None:
+    before = set(moved.rows())
+    with pytest.raises(InputError, match="map version 4 opens"):
+        moved.apply(change(4, opened=[landmark("B", 0.0, 0.0)]), checkpoint(99))
+    assert (set(moved.rows()), moved.checkpoint()) == (before, checkpoint(30))
+
+
+def test_a_landmark_may_return_after_it_was_gone(moved: LandmarkStore) -> None:
+    moved.apply(change(4, opened=[landmark("A", 0.0, 0.0)]), checkpoint(40))
+    assert ids(moved.landmarks(LandmarkQuery(as_of=3))) == ["B", "C"]
+    assert ids(moved.landmarks(LandmarkQuery(as_of=4))) == ["A", "B", "C"]
+
+
+def test_rows_hold_every_version_of_every_landmark(moved: LandmarkStore) -> None:
+    rows = [row for row in moved.rows() if isinstance(row, Landmark)]
+    assert sorted((row.landmark, row.valid_from_version) for row in rows) == [("A", 1), ("B", 1), ("B", 2), ("C", 2)]
+
+
+def test_trajectories_anchors_and_offsets_come_back_exactly(store: LandmarkStore) -> None:
+    whole = examples.whole_change()
+    store.apply(whole, checkpoint(1))
+    expected = {whole.version, *whole.opened, *whole.trajectories, *whole.anchors, *whole.image_offsets}
+    assert set(store.rows()) == expected

@@ -1,0 +1,109 @@
+"""Events as rows of the database."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from landmark_maps.examples import (
+    LABEL_STREAM,
+    MAP_STREAM,
+    ORIGIN,
+    START_NS,
+    frame,
+    label,
+    solved_landmark,
+    solved_map,
+    whole_change,
+)
+from trigpoint.events.envelope import Envelope, EventIdentity, LogPosition
+from trigpoint.events.mapped import LandmarkSolved
+from trigpoint.landmarks.model import MapChange, observations_of
+from trigpoint_landmarks.core.rows import labels_within, map_change, valid_after
+from trigpoint_landmarks.core.versions import solved_versions
+
+
+def changed(map_version: int, landmarks: list[LandmarkSolved], held: MapChange | None = None) -> MapChange:
+    """The change a version of these landmarks makes after `held`."""
+    rows = [
+        (LogPosition(MAP_STREAM, number), Envelope(EventIdentity("optimisation", "boot-1", number), START_NS, event))
+        for number, event in enumerate(solved_map(map_version, landmarks))
+    ]
+    (version,) = solved_versions(rows)
+    return map_change(version, frame=frame(), labels={}, valid=valid_after({}, held) if held else {})
+
+
+def test_a_landmark_stands_at_its_grid_position() -> None:
+    (row,) = changed(1, [solved_landmark("L1", 1.5, -2.5)]).opened
+    assert (row.easting_m, row.northing_m) == (ORIGIN.easting_m + 1.5, ORIGIN.northing_m - 2.5)
+
+
+def test_a_landmark_at_the_origin_is_in_victoria_park() -> None:
+    (row,) = changed(1, [solved_landmark("L1", 0.0, 0.0)]).opened
+    # 332 000 E, 6 248 000 N in zone 56 south by Krueger's series to n^3, worked out apart; 1e-7 degrees are 1 cm.
+    assert (row.lat_deg, row.lon_deg) == pytest.approx((-33.8950034, 151.1831396), abs=1e-7)
+
+
+def test_the_ellipse_is_that_of_the_covariance() -> None:
+    (row,) = changed(1, [solved_landmark("L1", 0.0, 0.0)]).opened
+    along = np.array([math.cos(row.ellipse_heading_rad), math.sin(row.ellipse_heading_rad)])
+    # Variance along the longer axis is its square, and the product of the squares the determinant; rounding only.
+    assert along @ row.covariance_m2 @ along == pytest.approx(row.sigma_major_m**2, rel=1e-12)
+    assert (row.sigma_major_m * row.sigma_minor_m) ** 2 == pytest.approx(0.04 * 0.09 - 0.01**2, rel=1e-12)
+
+
+def test_a_landmark_names_its_observations() -> None:
+    (row,) = changed(1, [solved_landmark("L1", 0.0, 0.0)]).opened
+    assert observations_of(row.provenance) == solved_landmark("L1", 0.0, 0.0).observations
+
+
+def test_a_landmark_is_anchored_by_the_anchors_it_names() -> None:
+    rows = changed(1, [solved_landmark("L1", 0.0, 0.0), solved_landmark("L2", 0.0, 9.0)]).opened
+    assert [(row.anchored, row.anchors) for row in rows] == [(True, ("anchor-1",)), (False, ())]
+
+
+def test_a_landmark_solved_exactly_as_before_keeps_its_row() -> None:
+    first = changed(1, [solved_landmark("L1", 0.0, 0.0)])
+    again = changed(2, [solved_landmark("L1", 0.0, 0.0, map_version=2)], first)
+    assert (again.opened, again.closed) == ((), ())
+
+
+def test_a_landmark_moved_by_the_least_bit_gets_a_new_row() -> None:
+    first = changed(1, [solved_landmark("L1", 1.0, 0.0)])
+    moved = changed(2, [solved_landmark("L1", math.nextafter(1.0, 2.0), 0.0, map_version=2)], first)
+    assert ([row.valid_from_version for row in moved.opened], moved.closed) == ([2], ("L1",))
+
+
+def test_a_landmark_no_longer_solved_is_closed() -> None:
+    first = changed(1, [solved_landmark("L1", 0.0, 0.0), solved_landmark("L2", 9.0, 0.0)])
+    gone = changed(2, [solved_landmark("L2", 9.0, 0.0, map_version=2)], first)
+    assert (gone.opened, gone.closed, list(valid_after(valid_after({}, first), gone))) == ((), ("L1",), ["L2"])
+
+
+def test_a_trajectory_is_a_line_on_the_grid_with_its_length() -> None:
+    (path,) = whole_change().trajectories
+    assert path.path[0] == (ORIGIN.easting_m, ORIGIN.northing_m)
+    assert (path.length_m, path.pose_count, path.last_stamp_ns - path.first_stamp_ns) == (20.0, 3, 2_000_000_000)
+    assert json.loads(path.calibration_json) == [["speed_scale", 1.01, 0.001]]
+
+
+def test_an_anchor_stands_where_its_label_is() -> None:
+    tied, untied = whole_change().anchors
+    assert (tied.lat_deg, tied.lon_deg, tied.image, tied.residual_m) == (-33.89, 151.19, "tile-1", 0.5)
+    assert (untied.landmark, untied.reason, untied.residual_m) == ("", "no landmark within reach", None)
+
+
+def test_an_anchor_whose_label_was_not_among_the_inputs_has_no_place() -> None:
+    unknown = whole_change().anchors[1]
+    assert (unknown.lat_deg, unknown.easting_m, unknown.sigma_m) == (None, None, None)
+
+
+def test_a_label_mended_after_the_solve_says_nothing_about_it() -> None:
+    labelled = [(LogPosition(LABEL_STREAM, n), label("anchor-1", lat_deg=-33.0 - n)) for n in range(3)]
+    assert labels_within(labelled, [(LABEL_STREAM, 2)])["anchor-1"].lat_deg == -34.0
+    assert labels_within(labelled, [("other", 2)]) == {}
+
+
+def test_an_empty_map_has_no_rows() -> None:
+    assert changed(1, []).opened == ()
