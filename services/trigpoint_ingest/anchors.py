@@ -6,7 +6,7 @@ from json import dumps
 
 from trigpoint.errors import FrameRefused
 from trigpoint.events.codec import encode, schema_name
-from trigpoint.events.corrected import AnchorLabelled
+from trigpoint.events.corrected import AnchorLabelled, anchors_in_force
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.observed import EventRefused, MapFramePinned
@@ -51,7 +51,7 @@ def import_anchors(found: LabelledAnchors, log: EventLog, *, stamp_ns: int = 0) 
     """
     located = near_map(found.anchors, _frame(found.anchors, log, stamp_ns)) if found.anchors else found
     refused = found.refused + located.refused if found.anchors else found.refused
-    in_force = {(anchor.anchor, anchor.image): anchor for anchor in _logged(log)}
+    in_force = {(anchor.anchor, anchor.image): anchor for anchor in anchors_in_force(_logged(log))}
     new = [anchor for anchor in located.anchors if in_force.get((anchor.anchor, anchor.image)) != anchor]
     if new:
         log.append(CORRECTIONS_STREAM, _rows(new, stamp_ns, number=log.next_number(CORRECTIONS_STREAM)))

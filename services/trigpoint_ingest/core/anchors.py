@@ -92,7 +92,7 @@ def _labelled(row: AnchorRow) -> AnchorLabelled:
         lon_deg=lon_deg,
         sigma_m=_sigma(row.sigma_m, LABEL_SIGMA_M, row.anchor),
         image=row.image,
-        image_sigma_m=_sigma(row.image_sigma_m, IMAGE_SIGMA_M, row.anchor) if row.image else 0.0,
+        image_sigma_m=_image_sigma(row),
         kind=row.kind,
         signature=row.signature,
         source_crs=row.crs,
@@ -140,6 +140,13 @@ def _sigma(stated_m: float, default_m: float, anchor: str) -> float:
             f"anchor {anchor!r} has a sigma of {sigma_m:g} m, outside {SIGMA_SMALLEST_M:g} to {SIGMA_LARGEST_M:g} m",
         )
     return sigma_m
+
+
+def _image_sigma(row: AnchorRow) -> float:
+    """0 for a survey: without an image, or said so."""
+    if not row.image or row.image_sigma_m == 0.0:
+        return 0.0
+    return _sigma(row.image_sigma_m, IMAGE_SIGMA_M, row.anchor)
 
 
 def _elsewhere(known: AnchorLabelled, other: AnchorLabelled) -> str:

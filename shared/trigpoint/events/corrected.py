@@ -1,5 +1,6 @@
 """What people added or took back: anchors labelled in aerial images. Writer: the anchor import of ingest."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 
@@ -25,3 +26,8 @@ class AnchorLabelled:
 
 
 Corrected = AnchorLabelled
+
+
+def anchors_in_force(labels: Iterable[AnchorLabelled]) -> tuple[AnchorLabelled, ...]:
+    """The labels that hold, from all in order of appending: of one name in one image the last, first named first."""
+    return tuple({(label.anchor, label.image): label for label in labels}.values())

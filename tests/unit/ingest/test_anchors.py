@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -50,8 +51,9 @@ def test_an_image_label_without_sigmas_gets_the_defaults() -> None:
     assert (anchor.sigma_m, anchor.image_sigma_m) == (LABEL_SIGMA_M, IMAGE_SIGMA_M)
 
 
-def test_a_survey_has_no_image_offset() -> None:
-    anchor = labelled([replace(ROW, image="", image_sigma_m=0.5, sigma_m=0.02)]).anchors[0]
+@pytest.mark.parametrize("said", [{"image": "", "image_sigma_m": 0.5}, {"image": "survey", "image_sigma_m": 0.0}])
+def test_a_survey_has_no_image_offset(said: dict[str, Any]) -> None:
+    anchor = labelled([replace(ROW, sigma_m=0.02, **said)]).anchors[0]
     assert (anchor.sigma_m, anchor.image_sigma_m) == (0.02, 0.0)
 
 
