@@ -5,8 +5,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from google.protobuf.message_factory import GetMessages
 from mcap.reader import make_reader
-from mcap_protobuf.decoder import DecoderFactory
 
 from event_examples.one_each import ONE_OF_EACH
 from event_examples.rows import START_NS, STEP_NS, fix_row, imu_row, imu_rows
@@ -154,9 +155,18 @@ def test_a_finished_file_passes_the_mcap_reader_with_checksums(log: McapLog) -> 
     log.append(STREAM, ONE_OF_EACH)
     log.close()
     with _only_file(log).open("rb") as file:
-        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
-        decoded = list(reader.iter_decoded_messages(log_time_order=False))
-    assert [row.message.sequence for row in decoded] == [row.identity.sequence for row in ONE_OF_EACH]
+        found = list(make_reader(file, validate_crcs=True).iter_messages(log_time_order=False))
+    assert [message.sequence for _, _, message in found] == [row.identity.sequence for row in ONE_OF_EACH]
+
+
+def test_a_file_tells_a_stranger_how_to_decode_its_messages(log: McapLog) -> None:
+    log.append(STREAM, [fix_row(7)])
+    log.close()
+    with _only_file(log).open("rb") as file:
+        ((schema, _, message),) = make_reader(file).iter_messages()
+    assert schema is not None
+    decoded = GetMessages(FileDescriptorSet.FromString(schema.data).file)[schema.name].FromString(message.data)
+    assert (decoded.latitude, decoded.longitude) == (-33.89, 151.19)  # type: ignore[attr-defined]  # made at run time
 
 
 def test_the_mcap_reader_finds_a_time_range_through_the_index(log: McapLog) -> None:
