@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -177,16 +178,15 @@ class McapLog:
 
     def close(self) -> None:
         """All files ended with their index, all streams let go. Raises AppendFailed if that cannot be written."""
-        with self._lock:
-            try:
-                while self._writers:
-                    _, writer = self._writers.popitem()
-                    writer.close()
-            finally:
-                self._catalog.close()
+        with self._lock, ExitStack() as closing:  # each one is closed, whatever becomes of the others
+            closing.callback(self._catalog.close)
+            while self._writers:
+                closing.callback(self._writers.popitem()[1].close)
 
     def _bring_up_to_date(self, stream: str) -> None:
-        bring_up_to_date(self._catalog, self.directory / valid_stream(stream), stream)
+        """The catalog says what the files say; of a stream written here it always does."""
+        if stream not in self._writers:
+            bring_up_to_date(self._catalog, self.directory / valid_stream(stream), stream)
 
     def _bring_all_up_to_date(self) -> None:
         there = {path.name for path in self.directory.iterdir() if path.is_dir() and not path.name.startswith(".")}

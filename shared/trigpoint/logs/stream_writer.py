@@ -18,14 +18,16 @@ from trigpoint.logs.mcap_writer import CHANNEL_LIMIT, McapFileWriter, WrittenChu
 LOCK_NAME = ".lock"
 FILE_BYTES = 64 * 1024 * 1024  # small enough to copy and to rescan in about a second
 FILE_SPAN_NS = 3_600_000_000_000  # an hour of measurements
+SPAN_LEAST_BYTES = 1024 * 1024  # drives of different years in one stream must not make a file an append
 
 
 @dataclass(frozen=True, slots=True)
 class Rotation:
-    """When a file is long enough: by its bytes, or by the time its measurements span."""
+    """When a file is long enough: by its bytes, or, from `span_least_bytes` on, by the time its measurements span."""
 
     size_bytes: int = FILE_BYTES
     span_ns: int = FILE_SPAN_NS
+    span_least_bytes: int = SPAN_LEAST_BYTES
 
 
 @dataclass(slots=True)
@@ -38,7 +40,7 @@ class _OpenFile:
     start_ns: int
     end_ns: int
     channels_known: int = 0
-    durable_bytes: int = 0
+    durable_bytes: int = 0  # and entered in the catalog
 
 
 class StreamWriter:
@@ -65,17 +67,21 @@ class StreamWriter:
 
     def append(self, rows: Sequence[PackedRow], metadata: Mapping[str, Mapping[str, str]]) -> None:
         """The rows durable. Raises AppendFailed; nothing of them counts as appended then, and the stream is let go."""
+        number = self.next_number
         try:
             target = self._open_file or self._begin(rows[0], metadata)
             chunks = target.writer.append(rows)
             os.fsync(target.file.fileno())
-            target.durable_bytes = target.writer.size_bytes
             self._enter(target, chunks)
+            target.durable_bytes = target.writer.size_bytes
             if self._is_long_enough(target):
                 self._end(target)
         except (OSError, sqlite3.Error) as error:
             self._abandon()
-            raise AppendFailed(f"stream {self._folder.name}, number {self.next_number}: {error}") from error
+            raise AppendFailed(f"stream {self._folder.name}, number {number}: {error}") from error
+        except BaseException:
+            self._abandon()
+            raise
 
     def close(self) -> None:
         """The file ended with its summary, the stream let go. Raises AppendFailed if that cannot be written."""
@@ -113,11 +119,9 @@ class StreamWriter:
         return CatalogFile(self._folder.name, target.first_number, target.writer.size_bytes, finished)
 
     def _is_long_enough(self, target: _OpenFile) -> bool:
-        return (
-            target.writer.size_bytes >= self._rotation.size_bytes
-            or target.end_ns - target.start_ns >= self._rotation.span_ns
-            or len(target.writer.channels) >= CHANNEL_LIMIT // 2
-        )
+        size_bytes, rotation = target.writer.size_bytes, self._rotation
+        spans = target.end_ns - target.start_ns >= rotation.span_ns and size_bytes >= rotation.span_least_bytes
+        return size_bytes >= rotation.size_bytes or spans or len(target.writer.channels) >= CHANNEL_LIMIT // 2
 
     def _end(self, target: _OpenFile) -> None:
         target.writer.finish()

@@ -1,6 +1,7 @@
 import resource
 import shutil
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from mcap.reader import make_reader
 from event_examples.one_each import ONE_OF_EACH
 from event_examples.rows import START_NS, STEP_NS, fix_row, imu_row, imu_rows
 from trigpoint.errors import AppendFailed, LogDamaged
-from trigpoint.events.envelope import LogPosition
+from trigpoint.events.envelope import Envelope, EventIdentity, LogPosition
 from trigpoint.events.observed import GnssFixReceived, MapFramePinned
 from trigpoint.logs.mcap_log import McapLog
 from trigpoint.logs.stream_writer import Rotation
@@ -39,7 +40,7 @@ def _sequences(log: McapLog) -> list[int]:
 @pytest.fixture
 def small_files(tmp_path: Path) -> Iterator[McapLog]:
     """Ten files of ten events each, in ten chunks of one."""
-    opened = McapLog(tmp_path / "small", rotation=Rotation(span_ns=9 * STEP_NS))
+    opened = McapLog(tmp_path / "small", rotation=Rotation(span_ns=9 * STEP_NS, span_least_bytes=0))
     for row in imu_rows(0, 100):
         opened.append(STREAM, [row])
     yield opened
@@ -251,3 +252,21 @@ def test_a_stream_whose_folder_is_gone_is_gone(log: McapLog) -> None:
     first.close()
     shutil.rmtree(log.directory / "veh-car")
     assert log.streams() == ()
+
+
+def test_drives_of_different_years_share_a_file(log: McapLog) -> None:
+    old = Envelope(EventIdentity("van", "boot-0", 0), 0, imu_row(0).event)
+    for row in (imu_row(0), old, imu_row(1)):
+        log.append(STREAM, [row])
+    assert len(log.contents(STREAM)) == 1
+
+
+def test_streams_are_written_and_read_from_several_threads(log: McapLog) -> None:
+    def written(vehicle: str) -> int:
+        for first in range(0, 200, 10):
+            log.append(f"veh-{vehicle}", imu_rows(first, first + 10, vehicle=vehicle))
+            log.next_number("veh-b")
+        return sum(1 for _ in log.read(f"veh-{vehicle}"))
+
+    with ThreadPoolExecutor(3) as threads:
+        assert list(threads.map(written, ["a", "b", "c"])) == [200, 200, 200]

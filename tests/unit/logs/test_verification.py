@@ -17,7 +17,7 @@ STREAM = "veh-van"
 @pytest.fixture
 def directory(tmp_path: Path) -> Path:
     """A closed log of three files."""
-    log = McapLog(tmp_path / "log", rotation=Rotation(span_ns=9 * STEP_NS))
+    log = McapLog(tmp_path / "log", rotation=Rotation(span_ns=9 * STEP_NS, span_least_bytes=0))
     for first in (0, 10, 20):
         log.append(STREAM, imu_rows(first, first + 10))
     log.close()
