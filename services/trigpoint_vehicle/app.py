@@ -94,7 +94,10 @@ def _robot_sources(source: Path, robot: int) -> RobotSources:
 
 
 def convert_table(manifest_path: Path, out_dir: Path, *, data_dir: Path | None = None) -> Written:
-    """The tables a manifest describes as logs, truth and anchors; `data_dir` replaces the manifest's. Raises InputError."""
+    """The tables a manifest describes as logs, truth and anchors; `data_dir` replaces the manifest's.
+
+    Raises InputError.
+    """
     text = read_source(manifest_path.parent, manifest_path.name)
     manifest = parsed_manifest(text.name, text.text)
     folder = data_dir or manifest_path.parent / manifest.data_dir

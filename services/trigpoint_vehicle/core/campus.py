@@ -12,7 +12,7 @@ from trigpoint.geodesy.poses import transform_points, wrap_angles_rad
 from trigpoint.geodesy.positions import GridPosition
 from trigpoint.geodesy.projection import MapFrame, pin_map_frame, wgs84_from_map_points
 from trigpoint_vehicle.core.campus_settings import CampusSettings
-from trigpoint_vehicle.core.imagery import Imagery, Labels, read_labels, taken_imagery
+from trigpoint_vehicle.core.imagery import Imagery, Labels, PolesSeen, read_labels, taken_imagery
 from trigpoint_vehicle.core.motion import Motion, driven_line_m, motion_along, standing_motion
 from trigpoint_vehicle.core.odometry import imu_readings, sampled_indices, stamps_ns, wheel_speeds
 from trigpoint_vehicle.core.placement import PlacedLandmarks, placed_landmarks
@@ -89,9 +89,7 @@ def _described(vehicle: str, settings: CampusSettings) -> VehicleDescribed:
 
 
 def _over_ground(motion: Motion, scale: float) -> Motion:
-    return replace(
-        motion, speed_mps=motion.speed_mps / scale, acceleration_mps2=motion.acceleration_mps2 / scale
-    )
+    return replace(motion, speed_mps=motion.speed_mps / scale, acceleration_mps2=motion.acceleration_mps2 / scale)
 
 
 def _point_on_vehicle_m(pose: Floats, x_m: float, y_m: float, scale: float) -> Floats:
@@ -186,17 +184,14 @@ def _seen_counts(world: _World, driven: list[_Driven]) -> Ints:
 
 
 def _labels(world: _World, driven: list[_Driven], imagery: Imagery) -> Labels:
-    settings, poles = world.settings, world.landmarks.kind.count("pole")
-    extent_m = (settings.streets.width_m, settings.streets.height_m)
-    return read_labels(
-        world.landmarks.position_m[:poles],
-        _seen_counts(world, driven)[:poles] >= settings.imagery.sightings_min,
-        imagery=imagery,
-        quadrangle_m=quadrangle_box_m(world.streets, settings.streets.quadrangle_margin_m),
-        extent_m=extent_m,
-        settings=settings.imagery,
-        rng=_stream(world.seed, LABELS),
+    streets, poles = world.settings.streets, world.landmarks.kind.count("pole")
+    seen = PolesSeen(
+        pole_m=world.landmarks.position_m[:poles],
+        sightings=_seen_counts(world, driven)[:poles],
+        quadrangle_m=quadrangle_box_m(world.streets, streets.quadrangle_margin_m),
+        extent_m=(streets.width_m, streets.height_m),
     )
+    return read_labels(seen, imagery, world.settings.imagery, _stream(world.seed, LABELS))
 
 
 def _anchors(world: _World, labels: Labels, imagery: Imagery) -> tuple[AnchorLabelled, ...]:

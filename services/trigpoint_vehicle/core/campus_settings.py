@@ -39,7 +39,7 @@ class LandmarkSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RouteSettings:
-    """Loops through the streets. `plan` is "loop", or for bad-input trials "apart", "straight" or "standing"."""
+    """Loops through the streets. `plan` is "loop", or "apart" (drives that never meet), "straight" or "standing"."""
 
     plan: str = "loop"
     length_min_m: float = 4000.0
@@ -221,8 +221,11 @@ def with_gnss_only(settings: CampusSettings) -> CampusSettings:
 
 
 def with_plan(settings: CampusSettings, plan: str) -> CampusSettings:
-    """The same campus with another plan of routes: "loop", "apart", "straight" or "standing"."""
-    return replace(settings, route=replace(settings.route, plan=plan))
+    """The same campus with another plan of routes; one that avoids the quadrangle has labels elsewhere only."""
+    imagery = settings.imagery
+    if plan != "loop":
+        imagery = replace(imagery, labels_in_quadrangle=0, labels_beside_it=0)
+    return replace(settings, route=replace(settings.route, plan=plan), imagery=imagery)
 
 
 def with_known_signatures(settings: CampusSettings) -> CampusSettings:

@@ -29,6 +29,17 @@ class Labels:
     position_m: Floats
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PolesSeen:
+    """Poles (n, 2) in grid metres and how often each was detected (n,), on a campus of `extent_m` east and north
+    with the quadrangle between two corners."""
+
+    pole_m: Floats
+    sightings: Ints
+    quadrangle_m: tuple[Floats, Floats]
+    extent_m: tuple[float, float]
+
+
 def taken_imagery(settings: ImagerySettings, rng: np.random.Generator) -> Imagery:
     """The images with their offsets."""
     names = [f"image-{row}-{column}" for row in range(settings.rows) for column in range(settings.columns)]
@@ -64,34 +75,25 @@ def _distance_to_box_m(point_m: Floats, box_m: tuple[Floats, Floats]) -> Floats:
     return np.hypot(outside[:, 0], outside[:, 1])
 
 
-def read_labels(
-    pole_m: Floats,
-    seen: NDArray[np.bool_],
-    *,
-    imagery: Imagery,
-    quadrangle_m: tuple[Floats, Floats],
-    extent_m: tuple[float, float],
-    settings: ImagerySettings,
-    rng: np.random.Generator,
-) -> Labels:
-    """Labels of poles (n, 2) in grid metres that were `seen` (n,): so many in the quadrangle, beside it, elsewhere.
+def read_labels(seen: PolesSeen, imagery: Imagery, settings: ImagerySettings, rng: np.random.Generator) -> Labels:
+    """Labels of poles seen often enough: so many in the quadrangle, beside it, elsewhere.
 
     Raises InputError if there are too few poles.
     """
-    image = image_numbers(pole_m, extent_m, settings)
-    middle = image_numbers(np.mean(quadrangle_m, axis=0)[None], extent_m, settings)[0]
-    away_m = _distance_to_box_m(pole_m, quadrangle_m)
-    inside = _drawn(
-        np.flatnonzero(seen & (away_m == 0.0) & (image == middle)),
-        settings.labels_in_quadrangle,
-        "in the quadrangle",
-        rng,
+    often = seen.sightings >= settings.sightings_min
+    image = image_numbers(seen.pole_m, seen.extent_m, settings)
+    middle = image_numbers(np.mean(seen.quadrangle_m, axis=0)[None], seen.extent_m, settings)[0]
+    away_m = _distance_to_box_m(seen.pole_m, seen.quadrangle_m)
+    inside = np.flatnonzero(often & (away_m == 0.0) & (image == middle))
+    beside = np.flatnonzero(often & (away_m > 0.0) & (away_m <= settings.beside_distance_m))
+    far = np.flatnonzero(often & (away_m > settings.beside_distance_m))
+    chosen = np.concatenate(
+        [
+            _drawn(inside, settings.labels_in_quadrangle, "in the quadrangle", rng),
+            _drawn(beside, settings.labels_beside_it, "beside the quadrangle", rng),
+            _spread(far, image, settings.labels_elsewhere, rng),
+        ]
     )
-    near = seen & (away_m > 0.0) & (away_m <= settings.beside_distance_m)
-    beside = _drawn(np.flatnonzero(near), settings.labels_beside_it, "beside the quadrangle", rng)
-    far = np.flatnonzero(seen & (away_m > settings.beside_distance_m))
-    elsewhere = _spread(far, image, settings.labels_elsewhere, rng)
-    chosen = np.concatenate([inside, beside, elsewhere])
     error_m = rng.normal(0.0, settings.label_sigma_m, (len(chosen), 2))
-    read_m = pole_m[chosen] + imagery.offset_m[image[chosen]] + error_m
+    read_m = seen.pole_m[chosen] + imagery.offset_m[image[chosen]] + error_m
     return Labels(landmark=chosen, image=image[chosen], position_m=read_m)

@@ -45,7 +45,8 @@ def _in_lane(corner_m: Floats, offset_m: float) -> Floats:
     ahead = np.diff(corner_m, axis=0)
     left = np.column_stack([-ahead[:, 1], ahead[:, 0]]) / np.linalg.norm(ahead, axis=1, keepdims=True)
     before, after = np.vstack([left[:1], left]), np.vstack([left, left[-1:]])
-    return corner_m + offset_m * (before + after) / (1.0 + (before * after).sum(axis=1, keepdims=True))
+    moved: Floats = corner_m + offset_m * (before + after) / (1.0 + (before * after).sum(axis=1, keepdims=True))
+    return moved
 
 
 def driven_line_m(corner_m: Floats, settings: StreetSettings, rng: np.random.Generator) -> Floats:
@@ -59,7 +60,8 @@ def driven_line_m(corner_m: Floats, settings: StreetSettings, rng: np.random.Gen
     length = settings.lane_wander_length_m
     wander = gauss_markov(len(line), 1, sigma=settings.lane_wander_m, step_s=PATH_STEP_M, time_s=length, rng=rng)
     wander = gaussian_filter1d(wander, length / 4.0 / PATH_STEP_M, axis=0)
-    return (smooth + wander * left)[ends:-ends]
+    driven: Floats = (smooth + wander * left)[ends:-ends]
+    return driven
 
 
 def _curvature(line: CubicSpline, at_m: Floats) -> Floats:
@@ -75,7 +77,8 @@ def _speed_limits(curvature: Floats, step_m: float, settings: MotionSettings, rn
     mood = gaussian_filter1d(mood, length / 6.0 / step_m)
     wish = settings.speed_min_mps + span * np.clip(0.5 + mood, 0.0, 1.0)
     bend = np.sqrt(settings.lateral_acceleration_max_mps2 / np.maximum(np.abs(curvature), 1e-6))
-    return np.minimum(wish, np.maximum(bend, settings.bend_speed_min_mps))
+    limit: Floats = np.minimum(wish, np.maximum(bend, settings.bend_speed_min_mps))
+    return limit
 
 
 def _within_acceleration(limit_mps: Floats, step_m: float, acceleration_mps2: float) -> Floats:
@@ -86,7 +89,8 @@ def _within_acceleration(limit_mps: Floats, step_m: float, acceleration_mps2: fl
     forwards = np.minimum.accumulate(squared - rise * index) + rise * index
     both = np.minimum.accumulate((forwards + rise * index)[::-1])[::-1] - rise * index
     ends = rise * np.minimum(index, index[::-1])
-    return np.sqrt(np.minimum(both, ends))
+    speed: Floats = np.sqrt(np.minimum(both, ends))
+    return speed
 
 
 def _travelled(speed_mps: Floats, step_m: float, settings: MotionSettings) -> tuple[Floats, Floats]:

@@ -26,7 +26,12 @@ class PlacedLandmarks:
 
 
 def _candidates_m(
-    streets: Streets, setback_m: tuple[float, float], settings: LandmarkSettings, *, count: int, rng: np.random.Generator
+    streets: Streets,
+    setback_m: tuple[float, float],
+    settings: LandmarkSettings,
+    *,
+    count: int,
+    rng: np.random.Generator,
 ) -> Floats:
     weight = streets.length_m * np.where(streets.in_quadrangle, settings.quadrangle_weight, 1.0)
     street = streets.street[rng.choice(len(weight), size=count, p=weight / weight.sum())]
@@ -34,7 +39,8 @@ def _candidates_m(
     along = (end_m - begin_m) / np.linalg.norm(end_m - begin_m, axis=1, keepdims=True)
     left = np.column_stack([-along[:, 1], along[:, 0]])
     side_m = rng.uniform(*setback_m, count) * rng.choice([-1.0, 1.0], count)
-    return begin_m + rng.uniform(0.0, 1.0, (count, 1)) * (end_m - begin_m) + side_m[:, None] * left
+    drawn: Floats = begin_m + rng.uniform(0.0, 1.0, (count, 1)) * (end_m - begin_m) + side_m[:, None] * left
+    return drawn
 
 
 def _street_distance_m(streets: Streets, point_m: Floats) -> Floats:
@@ -67,7 +73,9 @@ class _Ground:
 
     def clear_of_traffic(self, point_m: Floats) -> Floats:
         off_street = _street_distance_m(self.streets, point_m) >= self.settings.street_clearance_m
-        return point_m[off_street & (self.driven.query(point_m)[0] >= self.settings.driven_clearance_m)]
+        off_track = self.driven.query(point_m)[0] >= self.settings.driven_clearance_m
+        clear: Floats = point_m[off_street & off_track]
+        return clear
 
 
 def _poles_m(ground: _Ground, rng: np.random.Generator) -> list[Floats]:
@@ -98,7 +106,9 @@ def placed_landmarks(
     ground = _Ground(streets, cKDTree(driven_m), settings)
     poles = _poles_m(ground, rng)
     setback_m = (settings.corner_setback_min_m, settings.corner_setback_max_m)
-    drawn = _candidates_m(streets, setback_m, settings, count=CANDIDATES_FACTOR * max(settings.corner_count, 1), rng=rng)
+    drawn = _candidates_m(
+        streets, setback_m, settings, count=CANDIDATES_FACTOR * max(settings.corner_count, 1), rng=rng
+    )
     clear = ground.clear_of_traffic(drawn)
     corners = _spaced(clear, poles, count=settings.corner_count, spacing_m=settings.spacing_min_m)
     diameter_m = rng.uniform(settings.pole_diameter_min_m, settings.pole_diameter_max_m, len(poles))

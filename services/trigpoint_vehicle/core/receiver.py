@@ -9,6 +9,7 @@ from trigpoint_vehicle.core.campus_settings import CarParkSettings, GnssSettings
 from trigpoint_vehicle.core.correlated import gauss_markov
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 CLEAR, MULTIPATH, CAR_PARK = "clear", "multipath", "car park"
 
@@ -23,11 +24,13 @@ class FixErrors:
 
 def _turned(distance_m: Floats, rng: np.random.Generator) -> Floats:
     turn = rng.uniform(0.0, 2.0 * np.pi, len(distance_m))
-    return distance_m[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+    turned: Floats = distance_m[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+    return turned
 
 
 def _log_uniform(low: float, high: float, count: int, rng: np.random.Generator) -> Floats:
-    return np.exp(rng.uniform(np.log(low), np.log(high), count))
+    drawn: Floats = np.exp(rng.uniform(np.log(low), np.log(high), count))
+    return drawn
 
 
 def _multipath_m(time_s: Floats, settings: MultipathSettings, rng: np.random.Generator) -> Floats:
@@ -42,7 +45,7 @@ def _multipath_m(time_s: Floats, settings: MultipathSettings, rng: np.random.Gen
     return shift_m
 
 
-def _car_park_m(time_s: Floats, settings: CarParkSettings, rng: np.random.Generator) -> tuple[Floats, Floats]:
+def _car_park_m(time_s: Floats, settings: CarParkSettings, rng: np.random.Generator) -> tuple[Floats, Flags]:
     begin_s = float(time_s[-1]) * rng.uniform(settings.begin_min, settings.begin_max)
     inside = (time_s >= begin_s) & (time_s < begin_s + settings.duration_s)
     shift_m = _turned(_log_uniform(settings.shift_min_m, settings.shift_max_m, len(time_s), rng), rng)

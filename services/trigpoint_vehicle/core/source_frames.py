@@ -45,7 +45,10 @@ def local_frame_on_grid(crs: str, origin: GridPosition) -> SourceFrame:
 
 
 def local_frame_at(origin: Wgs84Position) -> SourceFrame:
-    """Metres on the ground from an origin, axes to its true east and north (azimuthal equidistant). Raises FrameRefused."""
+    """Metres on the ground from an origin, axes to its true east and north (azimuthal equidistant).
+
+    Raises FrameRefused.
+    """
     if not (abs(origin.lat_deg) <= 90.0 and abs(origin.lon_deg) <= 180.0):
         raise FrameRefused(f"local origin {origin.lat_deg}, {origin.lon_deg} is not on the Earth")
     projection = f"+proj=aeqd +lat_0={origin.lat_deg!r} +lon_0={origin.lon_deg!r} +datum=WGS84 +units=m +type=crs"

@@ -184,7 +184,10 @@ def _laps(streets: Streets, settings: RouteSettings, vehicle_index: int) -> Rout
 def planned_routes_m(
     streets: Streets, settings: RouteSettings, *, vehicles: int, rng: np.random.Generator
 ) -> tuple[Floats, ...]:
-    """One line of corners (k, 2) a vehicle in grid metres, as `settings.plan` says. Raises InputError for no such plan."""
+    """One line of corners (k, 2) a vehicle in grid metres, as `settings.plan` says.
+
+    Raises InputError for no such plan, and where no loop can be found.
+    """
     if settings.plan == "loop":
         walks: list[_Walk] = []
         for _ in range(vehicles):

@@ -49,9 +49,7 @@ def _true_sightings(
     noisy_m = range_m + rng.normal(0.0, settings.range_sigma_m, len(sweep))
     noisy_rad = bearing + rng.normal(0.0, settings.bearing_sigma_rad, len(sweep))
     seen &= (noisy_m > 0.0) & (noisy_m < settings.range_max_m)
-    return Sightings(
-        sweep=sweep[seen], landmark=landmark[seen], range_m=noisy_m[seen], bearing_rad=noisy_rad[seen]
-    )
+    return Sightings(sweep=sweep[seen], landmark=landmark[seen], range_m=noisy_m[seen], bearing_rad=noisy_rad[seen])
 
 
 def _clutter(sweeps: int, settings: SweepSettings, rng: np.random.Generator) -> Sightings:

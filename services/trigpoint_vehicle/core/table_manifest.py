@@ -125,8 +125,10 @@ class PositionPart(FilePart):
     @model_validator(mode="after")
     def _has_position(self) -> Self:
         degrees, metres = (self.lat, self.lon), (self.east, self.north)
-        if (None in degrees) == (None in metres) or (None in degrees and any(degrees)) or (
-            None in metres and any(metres)
+        if (
+            (None in degrees) == (None in metres)
+            or (None in degrees and any(degrees))
+            or (None in metres and any(metres))
         ):
             raise ValueError("give either lat and lon or east and north")
         return self

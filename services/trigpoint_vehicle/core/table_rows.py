@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from trigpoint.errors import InputError
 from trigpoint.events.corrected import AnchorLabelled
 from trigpoint.events.observed import (
     GnssFixReceived,
@@ -17,7 +18,6 @@ from trigpoint.events.observed import (
     WheelSpeedMeasured,
 )
 from trigpoint.events.truth import Truth, TruthLandmark, TruthPath
-from trigpoint.errors import InputError
 from trigpoint.geodesy.positions import Wgs84Position
 from trigpoint.geodesy.projection import utm_crs
 from trigpoint_vehicle.core.manifest_quantities import Quantity
@@ -36,8 +36,8 @@ from trigpoint_vehicle.core.table_manifest import (
     Manifest,
     PositionPart,
     TimeColumn,
-    TruePath,
     TrueLandmarks,
+    TruePath,
     Vehicle,
     WheelPairs,
     WheelSpeeds,
@@ -137,9 +137,7 @@ def _inertial(reading: _Reading, vehicle: Vehicle, part: Inertial) -> list[Timed
     stamps = _stamps_ns(table, part.time, reading.clock(vehicle))
     pulls = (_numbers(part.acceleration_x, table), _numbers(part.acceleration_y, table))
     rows = _kept(stamps, part.yaw_rate.of(table), *pulls, needed=1)
-    return [
-        (t, ImuMeasured(yaw_rate_radps=w, acceleration_x_mps2=x, acceleration_y_mps2=y)) for t, w, x, y in rows
-    ]
+    return [(t, ImuMeasured(yaw_rate_radps=w, acceleration_x_mps2=x, acceleration_y_mps2=y)) for t, w, x, y in rows]
 
 
 def _polar(vehicle: Vehicle, part: Detections, table: TextTable) -> tuple[Floats, Floats]:
@@ -290,7 +288,9 @@ def converted_tables(manifest: Manifest, manifest_text: str, texts: Sequence[Sou
         recordings=recordings,
         truth=Truth(
             paths=tuple(
-                _true_path(reading, vehicle, part, map_crs) for vehicle in manifest.vehicle for part in vehicle.true_path
+                _true_path(reading, vehicle, part, map_crs)
+                for vehicle in manifest.vehicle
+                for part in vehicle.true_path
             ),
             landmarks=tuple(mark for part in manifest.true_landmarks for mark in _true_landmarks(reading, part)),
         ),

@@ -98,7 +98,8 @@ def _exact_stamps_ns(texts: tuple[str, ...], unit_ns: int) -> Ints | None:
         counts = np.rint(np.array(texts, dtype=np.str_).astype(np.float64) * 10.0**decimals)
     except ValueError:
         return None
-    return counts.astype(np.int64) * (unit_ns // 10**decimals)
+    stamps: Ints = counts.astype(np.int64) * (unit_ns // 10**decimals)
+    return stamps
 
 
 def _split_rows(lines: Iterable[str], delimiter: str) -> Iterator[list[str]]:

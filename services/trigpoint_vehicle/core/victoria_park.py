@@ -74,9 +74,7 @@ def _wheels(source: SourceText) -> list[Timed]:
 def _sweeps(source: SourceText) -> list[Timed]:
     table = text_table(source, columns=("t", "range", "bearing", "diameter"), delimiter=WHITESPACE)
     bearing = table.numbers("bearing") - AHEAD_IN_FILE_RAD
-    columns = zip(
-        table.numbers("range").tolist(), bearing.tolist(), table.numbers("diameter").tolist(), strict=True
-    )
+    columns = zip(table.numbers("range").tolist(), bearing.tolist(), table.numbers("diameter").tolist(), strict=True)
     return sweeps_of(_stamps(table), [LandmarkDetection(r, angle, "pole", "", width) for r, angle, width in columns])
 
 
