@@ -31,20 +31,20 @@ BARCODE_KIND, VEHICLE_KIND = "barcode", "vehicle"
 
 @dataclass(frozen=True, slots=True)
 class _Subjects:
-    """Which landmark or robot wears which barcode."""
+    """Which subject wears which barcode; those not surveyed as landmarks are robots."""
 
     barcode: tuple[int, ...]
     subject: tuple[int, ...]
-    robots: frozenset[int]
+    surveyed: frozenset[str]
 
     def seen_as(self, barcode: int) -> tuple[str, str] | None:
         """Kind and signature, or None for a barcode nobody wears."""
         if barcode not in self.barcode:
             return None
         subject = self.subject[self.barcode.index(barcode)]
-        if subject in self.robots:
-            return VEHICLE_KIND, f"robot{subject}"
-        return BARCODE_KIND, f"landmark-{subject}"
+        if f"landmark-{subject}" in self.surveyed:
+            return BARCODE_KIND, f"landmark-{subject}"
+        return VEHICLE_KIND, f"robot{subject}"
 
 
 def robot_numbers(names: Iterable[str]) -> tuple[int, ...]:
@@ -80,9 +80,13 @@ def _whole(table: TextTable, column: str) -> list[int]:
         raise InputError(f"{table.source}: {column}: {error}") from None
 
 
-def _subjects(source: SourceText, robots: Iterable[int]) -> _Subjects:
+def _subjects(source: SourceText, anchors: Iterable[AnchorLabelled]) -> _Subjects:
     table = text_table(source, columns=("subject", "barcode"), delimiter=WHITESPACE)
-    return _Subjects(tuple(_whole(table, "barcode")), tuple(_whole(table, "subject")), frozenset(robots))
+    return _Subjects(
+        tuple(_whole(table, "barcode")),
+        tuple(_whole(table, "subject")),
+        frozenset(anchor.signature for anchor in anchors),
+    )
 
 
 def _odometry(source: SourceText) -> list[Timed]:
@@ -183,9 +187,9 @@ def mrclam(robots: Sequence[RobotSources], barcodes: SourceText, landmarks: Sour
     Raises InputError naming file, row and value.
     """
     frame = local_frame_on_grid(CRS, ORIGIN)
-    subjects = _subjects(barcodes, (sources.robot for sources in robots))
-    recorded = [_recording(sources, subjects) for sources in robots]
     anchors = _surveyed(landmarks, frame)
+    subjects = _subjects(barcodes, anchors)
+    recorded = [_recording(sources, subjects) for sources in robots]
     return Conversion(
         recordings=tuple(recording for recording, _ in recorded),
         truth=Truth(

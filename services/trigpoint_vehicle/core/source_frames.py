@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from trigpoint.errors import FrameRefused
 from trigpoint.geodesy.positions import GridPosition, Wgs84Position
-from trigpoint.geodesy.projection import WGS84, pin_map_frame, transform_coordinates
+from trigpoint.geodesy.projection import WGS84, is_geographic, pin_map_frame, transform_coordinates
 
 Floats = NDArray[np.float64]
 
@@ -60,6 +60,8 @@ def wgs84_from_source(x: Floats, y: Floats, frame: SourceFrame) -> tuple[Floats,
     lat_deg, lon_deg = np.full(x.shape, np.nan), np.full(x.shape, np.nan)
     known = np.isfinite(x) & np.isfinite(y)
     crs_x, crs_y = frame.offset_x_m + frame.scale * x[known], frame.offset_y_m + frame.scale * y[known]
+    if frame.in_degrees != is_geographic(frame.crs):
+        raise FrameRefused(f"CRS {frame.crs!r} is {'not ' if frame.in_degrees else ''}one of latitude and longitude")
     if frame.crs == WGS84:
         lat_deg[known], lon_deg[known] = crs_y, crs_x
     elif known.any():

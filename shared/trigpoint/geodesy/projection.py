@@ -82,6 +82,11 @@ def transformation_between(*, source_crs: str, target_crs: str) -> str:
     return f"{best.description}{accuracy}{'' if group.best_available else ', a better one needs a grid not installed'}"
 
 
+def is_geographic(crs: str) -> bool:
+    """Whether a CRS gives latitude and longitude. Raises FrameRefused if it is not known."""
+    return bool(_parsed_crs(crs).is_geographic)
+
+
 def utm_crs(position: Wgs84Position) -> str:
     """The EPSG name of the UTM zone a position lies in."""
     zone = int(math.floor((position.lon_deg + 180.0) / 6.0)) % 60 + 1
