@@ -16,6 +16,7 @@ from trigpoint.landmarks import tables
 
 CACHE_KIB = 65_536  # holds a map of 200 000 landmarks; SQLite's own 2 MB make every query read the file
 BUSY_TIMEOUT_S = 30.0  # how long a GIS program that is reading may keep a map version waiting
+DAMAGE_CODES = frozenset({sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_CORRUPT_VTAB})
 UNDATED = "1970-01-01T00:00:00.000Z"  # of layers still empty: a file's content never depends on the clock
 SQL_FUNCTIONS = {
     "ST_MinX": geometry.min_x,
@@ -28,11 +29,13 @@ SQL_FUNCTIONS = {
 
 @contextmanager
 def database_errors(path: Path) -> Iterator[None]:
-    """SQLite's errors inside as ServiceError that names the file."""
+    """SQLite's errors inside, with the file's name: InputError if the file is damaged or none, else ServiceError."""
     try:
         yield
     except (DatabaseError, sqlite3.DatabaseError) as error:
         cause = error.orig if isinstance(error, DatabaseError) else error
+        if getattr(cause, "sqlite_errorcode", None) in DAMAGE_CODES:
+            raise InputError(f"{path} is not a sound database: {cause}; delete it and replay the log") from error
         raise ServiceError(f"landmark database {path}: {cause}") from error
 
 
@@ -59,18 +62,18 @@ def driver_of(connection: Connection) -> sqlite3.Connection:
 def opened(path: Path, *, read_only: bool) -> Connection:
     """A connection to the landmark database in a file, which is created unless `read_only`.
 
-    Raises InputError for a file that is no landmark database of this version, and for one that is missing while
-    `read_only`; ServiceError if it cannot be opened or created.
+    Raises InputError for a file that is no sound landmark database of this version, and for one that is missing
+    while `read_only`; ServiceError if it cannot be opened or created.
     """
     if read_only and not path.is_file():
         raise InputError(f"no landmark database at {path}")
     with database_errors(path):
         connection = _connected(path, read_only=read_only)
-    try:
-        _prepared(connection, path, read_only=read_only)
-    except BaseException:
-        close(connection)
-        raise
+        try:
+            _prepared(connection, path, read_only=read_only)
+        except BaseException:
+            close(connection)
+            raise
     return connection
 
 
@@ -87,20 +90,17 @@ def _connected(path: Path, *, read_only: bool) -> Connection:
 
     engine = create_engine("sqlite://", creator=driver, poolclass=StaticPool, isolation_level="AUTOCOMMIT")
     connection = engine.connect()
+    driver_of(connection).execute(f"PRAGMA cache_size = -{CACHE_KIB}")
     for name, function in SQL_FUNCTIONS.items():
         driver_of(connection).create_function(name, 1, function, deterministic=True)
-    connection.execute(text(f"PRAGMA cache_size = -{CACHE_KIB}"))
     return connection
 
 
 def _prepared(connection: Connection, path: Path, *, read_only: bool) -> None:
-    try:
-        application_id = connection.scalar(text("PRAGMA application_id"))
-        empty = connection.scalar(text("SELECT count(*) FROM sqlite_master")) == 0
-    except DatabaseError as error:
-        raise InputError(f"{path} is not a landmark database: {error.orig}; delete it and replay the log") from error
+    application_id = connection.scalar(text("PRAGMA application_id"))
+    empty = connection.scalar(text("SELECT count(*) FROM sqlite_master")) == 0
     if empty and not read_only:
-        with database_errors(path), transaction(connection):
+        with transaction(connection):
             _created(connection)
     elif application_id != schema.APPLICATION_ID:
         raise InputError(
