@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
 from numpy.typing import NDArray
-from scipy.linalg import cholesky
 
 from trigpoint.geodesy.uncertainty import floored_covariance
 from trigpoint_filtering.core.motion import (
@@ -16,11 +15,12 @@ from trigpoint_filtering.core.motion import (
     BIAS_Y,
     HEADING,
     STATE_SIZE,
+    TURN_BIAS,
     Geometry,
     MotionStep,
+    TurnSource,
     X,
     Y,
-    base_motion,
     moved,
     step_variance,
 )
@@ -30,6 +30,9 @@ Floats = NDArray[np.float64]
 CORRELATION_FLOOR = 1e-9  # least eigenvalue of the correlation matrix: safely above double rounding
 VARIANCE_FLOOR = 1e-14
 VARIANCE_CAP = np.array([1e10, 1e10, 1.0, 0.25, 0.25, 0.25, 25.0, 25.0, 1e4, 1e4])  # past these nothing is known
+
+
+REST_RADPS2S = 1e-6  # (rad/s)^2 s: 1 mrad/s after a second at rest, some three times a MEMS gyroscope's noise
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +66,7 @@ class _SigmaPoints(MerweScaledSigmaPoints):  # type: ignore[misc]
     """Merwe's points, all at once."""
 
     def sigma_points(self, x: Floats, P: Floats) -> Floats:
-        spread = cholesky((self.alpha**2 * (self.n + self.kappa)) * P, check_finite=False)
+        spread = np.linalg.cholesky((self.alpha**2 * (self.n + self.kappa)) * P).T
         return np.concatenate([x[None, :], x + spread, x - spread])
 
 
@@ -100,12 +103,8 @@ class Estimator:
 
     def predicted(self, belief: Belief, step: MotionStep, noise: GnssNoise) -> Belief:
         """The belief after a step."""
-        _, yaw_rate_radps = base_motion(belief.mean[None, :], step, self.geometry)
         variance = step_variance(
-            step,
-            turned_rad=float(yaw_rate_radps[0]) * step.dt_s,
-            gnss_bias_sigma_m=noise.bias_sigma_m,
-            bias_time_s=noise.bias_time_s,
+            step, self.geometry, gnss_bias_sigma_m=noise.bias_sigma_m, bias_time_s=noise.bias_time_s
         )
         self._filter.x, self._filter.P, self._filter.Q = belief.mean, belief.covariance, np.diag(variance)
         self._filter.predict(dt=step.dt_s, step=step, bias_time_s=noise.bias_time_s)
@@ -122,10 +121,19 @@ class Estimator:
         return Correction(after, unscented.y, unscented.S, nis)
 
 
+def rested(belief: Belief, step: MotionStep) -> Belief:
+    """The belief after a step at rest: a gyroscope that turns while nothing moves shows its bias."""
+    if step.source is not TurnSource.IMU:
+        return belief
+    gain = belief.covariance[:, TURN_BIAS] / (belief.covariance[TURN_BIAS, TURN_BIAS] + REST_RADPS2S / step.dt_s)
+    mean = belief.mean - gain * (step.turn + belief.mean[TURN_BIAS])
+    return Belief(mean, sound_covariance(belief.covariance - np.outer(gain, belief.covariance[TURN_BIAS])))
+
+
 def _kept_sound(covariance: Floats) -> Floats:
     """A predicted covariance, symmetric; rebuilt only if a variance has left its bounds."""
     variance = covariance.diagonal()
-    if np.all(variance < VARIANCE_CAP) and np.all(variance > VARIANCE_FLOOR):
+    if (variance < VARIANCE_CAP).all() and variance.min() > VARIANCE_FLOOR:
         return 0.5 * (covariance + covariance.T)
     return sound_covariance(covariance)
 

@@ -17,8 +17,9 @@ OUTAGE_INTERVALS = 4.0
 KEPT_INTERVALS = 5
 RUN_FIXES = 4  # that agree among themselves end an outage
 RUN_SPAN_S = 1.5
-KEPT_RUN_FIXES = 32
+KEPT_RUN_FIXES = 64
 RUN_SIGMAS = 3.0  # within which a fix agrees with its run
+RELOCATION_SPAN_S = 30.0  # of a run outside the gate before it is believed: reflections last less
 DRIFT_M = 3.0  # by which a run may miss the gate and still be believed: this,
 DRIFT_SHARE = 0.02  # this share of the way since the last accepted fix,
 DRIFT_SIGMAS = 3.0  # and this many sigmas of the prediction
@@ -93,7 +94,7 @@ def judged(hypothesis: Hypothesis, fix: Fix, estimator: Estimator, *, limit: flo
     if outage and _is_complete(running.run):
         if inside:
             return _accepted(running, correction.belief, fix), _verdict(correction, limit, REACQUIRED)
-        if _is_within_drift(running, correction):
+        if _span_s(running.run) >= RELOCATION_SPAN_S and _is_within_drift(running, correction):
             return _accepted(running, _relocated(running, fix), fix), _verdict(correction, limit, REACQUIRED)
     rejected = replace(running, rejected_count=running.rejected_count + 1)
     return rejected, _verdict(correction, limit, OUTAGE if outage else OUTSIDE)
@@ -143,7 +144,9 @@ def _extended_run(hypothesis: Hypothesis, correction: Correction, fix: Fix) -> t
     way_m = hypothesis.odometer_m - run[0].odometer_m
     allowed_m = RUN_SIGMAS * (fix.noise.white_sigma_m * math.sqrt(1.0 + 1.0 / len(run)) + heading_sigma_rad * way_m)
     agrees = math.hypot(x_m - mean_m[0], y_m - mean_m[1]) <= allowed_m
-    return (*run, newest)[-KEPT_RUN_FIXES:] if agrees else (newest,)
+    if not agrees:
+        return (newest,)
+    return (*run, newest) if len(run) < KEPT_RUN_FIXES else (run[0], *run[2:], newest)
 
 
 def _mean_offset(run: tuple[RunFix, ...]) -> tuple[float, float]:
@@ -151,7 +154,11 @@ def _mean_offset(run: tuple[RunFix, ...]) -> tuple[float, float]:
 
 
 def _is_complete(run: tuple[RunFix, ...]) -> bool:
-    return len(run) >= RUN_FIXES and (run[-1].stamp_ns - run[0].stamp_ns) * SECONDS_PER_NS >= RUN_SPAN_S
+    return len(run) >= RUN_FIXES and _span_s(run) >= RUN_SPAN_S
+
+
+def _span_s(run: tuple[RunFix, ...]) -> float:
+    return (run[-1].stamp_ns - run[0].stamp_ns) * SECONDS_PER_NS
 
 
 def _is_within_drift(hypothesis: Hypothesis, correction: Correction) -> bool:

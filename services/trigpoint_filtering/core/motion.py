@@ -49,7 +49,7 @@ class TurnNoise:
 # Tuned on Victoria Park (steering), NCLT (wheels at 1 Hz) and the simulated campus (MEMS gyroscope).
 TURN_NOISE = {
     TurnSource.IMU: TurnNoise(0.003, 0.01, 1e-4, 0.001, 0.0005, 0.003),
-    TurnSource.STEERING: TurnNoise(0.08, 0.02, 2e-4, 0.0, 0.006, 0.02),
+    TurnSource.STEERING: TurnNoise(0.08, 0.02, 2e-4, 0.0, 0.015, 0.02),
     TurnSource.WHEELS: TurnNoise(0.08, 0.004, 1e-4, 0.002, 0.01, 0.1),
 }
 SPEED_SCALE_SIGMA = 0.04  # of the nominal wheel radius: wear, load, pressure
@@ -96,20 +96,20 @@ def geometry_of(described: VehicleDescribed, *, point_scale: float) -> Geometry:
 
 
 def base_motion(state: Floats, step: MotionStep, geometry: Geometry) -> tuple[Floats, Floats]:
-    """Speed of the base in m/s and yaw rate in rad/s, (n,) each, for states (n, 10).
+    """Speed of the base in m/s and yaw rate in rad/s, (n,) each, for states (n, 10), or one of each for (10,).
 
     A wheel at y to the left of the base runs at v - yaw rate * y; steering by Ackermann, tan(angle) / wheelbase.
     """
     if step.standing:
-        return np.zeros(len(state)), np.zeros(len(state))
-    speed_mps = state[:, SPEED_SCALE] * step.speed_mps
-    turn = state[:, TURN_SCALE] * step.turn
+        return np.zeros(state.shape[:-1]), np.zeros(state.shape[:-1])
+    speed_mps = state[..., SPEED_SCALE] * step.speed_mps
+    turn = state[..., TURN_SCALE] * step.turn
     if step.source is TurnSource.STEERING:
-        angle_rad = np.clip(turn + state[:, TURN_BIAS], -MAX_STEERING_RAD, MAX_STEERING_RAD)
+        angle_rad = np.clip(turn + state[..., TURN_BIAS], -MAX_STEERING_RAD, MAX_STEERING_RAD)
         curvature = np.tan(angle_rad) / geometry.wheelbase_m
         base_mps = speed_mps / np.maximum(1.0 - curvature * geometry.speed_wheel_y_m, MIN_WHEEL_RATIO)
         return base_mps, base_mps * curvature
-    bias = state[:, TURN_BIAS] * (step.speed_mps if step.source is TurnSource.WHEELS else 1.0)
+    bias = state[..., TURN_BIAS] * (step.speed_mps if step.source is TurnSource.WHEELS else 1.0)
     yaw_rate_radps = turn + bias
     return speed_mps + yaw_rate_radps * geometry.speed_wheel_y_m, yaw_rate_radps
 
@@ -132,9 +132,17 @@ BLIND_M_PER_ROOT_S = 20.0  # position walk while nothing is heard from the wheel
 BLIND_RAD_PER_ROOT_S = 0.1
 
 
-def step_variance(step: MotionStep, *, turned_rad: float, gnss_bias_sigma_m: float, bias_time_s: float) -> Floats:
+def _nominal_turn_rad(step: MotionStep, geometry: Geometry) -> float:
+    if step.source is not TurnSource.STEERING:
+        return step.turn * step.dt_s
+    angle_rad = min(max(step.turn, -MAX_STEERING_RAD), MAX_STEERING_RAD)
+    return step.speed_mps * step.dt_s * math.tan(angle_rad) / geometry.wheelbase_m
+
+
+def step_variance(step: MotionStep, geometry: Geometry, *, gnss_bias_sigma_m: float, bias_time_s: float) -> Floats:
     """Variances (10,) that a step adds to the state."""
     noise = TURN_NOISE[step.source]
+    turned_rad = _nominal_turn_rad(step, geometry)
     distance_m = abs(step.speed_mps) * step.dt_s
     variance = np.zeros(STATE_SIZE)
     variance[X] = variance[Y] = (

@@ -15,7 +15,7 @@ from trigpoint.events.estimated import FixJudged, GateAlarmed
 from trigpoint.events.observed import VehicleDescribed
 from trigpoint.geodesy.poses import Pose2
 from trigpoint.geodesy.positions import MapPosition
-from trigpoint_filtering.core.estimator import Belief, Estimator, GnssNoise, sound_covariance
+from trigpoint_filtering.core.estimator import Belief, Estimator, GnssNoise, rested, sound_covariance
 from trigpoint_filtering.core.gate import (
     INITIALISED,
     OUTAGE,
@@ -95,7 +95,7 @@ class Track:
     deposed_ns: int = 0
     calibration: Belief | None = None
     source: TurnSource | None = None
-    speed_mps: float = 0.0
+    step: MotionStep | None = None
     believed_ns: int = 0
     alarmed: tuple[str, ...] = ()
     verdict: FixJudged | None = None
@@ -128,36 +128,26 @@ def after_wheel(
     track: Track, speed_mps: float, *, steering_rad: float, yaw_rate_radps: float, stamp_ns: int
 ) -> Track:
     """The track after a wheel sample; steering and yaw rate NaN where not measured."""
-    track = _kept_or_lost(track, stamp_ns)
     odometer = after_wheel_sample(
         track.odometer, speed_mps, steering_rad=steering_rad, yaw_rate_radps=yaw_rate_radps, stamp_ns=stamp_ns
     )
-    return _with_due_step(track, odometer)
+    return with_odometer(track, odometer)
 
 
 def after_imu(track: Track, yaw_rate_radps: float, *, stamp_ns: int) -> Track:
     """The track after an IMU sample."""
-    return _with_due_step(track, after_imu_sample(track.odometer, yaw_rate_radps, stamp_ns=stamp_ns))
+    return with_odometer(track, after_imu_sample(track.odometer, yaw_rate_radps, stamp_ns=stamp_ns))
 
 
-def _with_due_step(track: Track, odometer: Odometer) -> Track:
-    # Half a nanosecond of slack: samples at 10 Hz must not fall just short of a step of 0.1 s.
-    if odometer.pending_s < track.following.settings.max_step_s - 1e-6:
-        return replace(track, odometer=odometer, verdict=None, alarm=None)
-    return _stepped(replace(track, odometer=odometer, verdict=None, alarm=None))
+def with_odometer(track: Track, odometer: Odometer) -> Track:
+    """The track with new samples in its odometer, and a step taken if one is due."""
+    track = replace(track, odometer=odometer, verdict=None, alarm=None)
+    return _stepped(track) if is_step_due(track.following, odometer) else track
 
 
-def _kept_or_lost(track: Track, stamp_ns: int) -> Track:
-    """The track as it was, or sought anew if the wheels were silent for too long."""
-    if silent_s(track.odometer, stamp_ns) <= LOST_AFTER_S:
-        return track
-    odometer = Odometer(track.odometer.has_wheelbase, stamp_ns=stamp_ns)
-    calibration = track.hypothesis.belief if track.hypothesis else track.calibration
-    refusal = f"no wheel speed for {silent_s(track.odometer, stamp_ns):.0f} s"
-    return replace(
-        track, odometer=odometer, hypothesis=None, alternate=None, seeker=Seeker(ORIGIN), calibration=calibration,
-        refusal=refusal,
-    )  # fmt: skip
+def is_step_due(following: Following, odometer: Odometer) -> bool:
+    """Whether the pending motion makes a whole step; a microsecond short is whole (10 Hz against 0.1 s)."""
+    return odometer.pending.s >= following.settings.max_step_s - 1e-6
 
 
 def _stepped(track: Track) -> Track:
@@ -165,20 +155,42 @@ def _stepped(track: Track) -> Track:
     step, odometer = taken_step(track.odometer)
     if step is None:
         return replace(track, odometer=odometer)
-    track = _calibrated_for(replace(track, odometer=odometer), step.source)
+    track = _calibrated_for(replace(track, odometer=odometer, step=step, believed_ns=odometer.stamp_ns), step.source)
+    blind_s = max(step.blind_s, silent_s(odometer, odometer.stamp_ns))
+    if blind_s > LOST_AFTER_S:
+        return _lost(track, f"no wheel speed for {blind_s:.0f} s: {LOST_AFTER_S:.0f} s is the limit")
     hypothesis, alternate = track.hypothesis, track.alternate
     return replace(
         track,
-        believed_ns=odometer.stamp_ns,
         hypothesis=_predicted(track, hypothesis, step) if hypothesis else None,
         alternate=_predicted(track, alternate, step) if alternate else None,
         seeker=_reckoned(track, step),
-        speed_mps=_base_speed_mps(track, step),
+        calibration=_rested_calibration(track, step),
+    )
+
+
+def _rested_calibration(track: Track, step: MotionStep) -> Belief | None:
+    if track.calibration is None or track.hypothesis is not None or not step.standing:
+        return track.calibration
+    return rested(track.calibration, step)
+
+
+def _lost(track: Track, refusal: str) -> Track:
+    """The track sought anew, with the calibration it had."""
+    return replace(
+        track,
+        hypothesis=None,
+        alternate=None,
+        deposed_ns=0,
+        seeker=Seeker(ORIGIN),
+        calibration=_best_calibration(track),
+        refusal=refusal,
     )
 
 
 def _predicted(track: Track, hypothesis: Hypothesis, step: MotionStep) -> Hypothesis:
     belief = track.following.estimator.predicted(hypothesis.belief, step, track.noise)
+    belief = rested(belief, step) if step.standing else belief
     odometer_m = hypothesis.odometer_m + abs(step.speed_mps) * step.dt_s
     return replace(hypothesis, belief=belief, odometer_m=odometer_m)
 
@@ -189,9 +201,12 @@ def _best_calibration(track: Track) -> Belief:
     return belief
 
 
-def _base_speed_mps(track: Track, step: MotionStep) -> float:
-    speed_mps, _ = base_motion(_best_calibration(track).mean[None, :], step, track.following.geometry)
-    return float(speed_mps[0])
+def base_speed_mps(track: Track) -> float:
+    """Speed of the base over the last step taken, 0 before the first."""
+    if track.step is None:
+        return 0.0
+    speed_mps, _ = base_motion(_best_calibration(track).mean, track.step, track.following.geometry)
+    return float(speed_mps)
 
 
 def _reckoned(track: Track, step: MotionStep) -> Seeker | None:
@@ -236,7 +251,6 @@ def _with_turn_of(belief: Belief, prior: Belief) -> Belief:
 def after_fix(track: Track, position: MapPosition, *, stamp_ns: int, sigma_m: float, sequence: int) -> Track:
     """The track after a fix, with its verdict on it; `sigma_m` NaN where the receiver declares none."""
     late_s = (track.odometer.stamp_ns - stamp_ns) * SECONDS_PER_NS
-    track = _kept_or_lost(track, stamp_ns)
     noise = gnss_noise(sigma_m, track.following.settings)
     track = replace(track, odometer=advanced(track.odometer, stamp_ns), noise=noise, alarm=None)
     track = _stepped(track)
@@ -245,13 +259,13 @@ def after_fix(track: Track, position: MapPosition, *, stamp_ns: int, sigma_m: fl
         return _told(track, _unjudged(LATE), sequence)
     if track.hypothesis is None:
         return _sought(track, Fix(stamp_ns, point_m, noise), sequence)
-    forward = _moved_forward(track, track.hypothesis, point_m, late_s)
+    forward = _moved_forward(track, track.hypothesis, point_m, late_s) if late_s > 0.0 else point_m
     return _gated(track, track.hypothesis, Fix(max(stamp_ns, track.odometer.stamp_ns), forward, noise), sequence)
 
 
 def _moved_forward(track: Track, hypothesis: Hypothesis, point_m: np.ndarray, late_s: float) -> np.ndarray:  # type: ignore[type-arg]
     heading_rad = float(hypothesis.belief.mean[HEADING])
-    way_m = max(late_s, 0.0) * track.speed_mps
+    way_m = late_s * base_speed_mps(track)
     return point_m + way_m * np.array([math.cos(heading_rad), math.sin(heading_rad)])
 
 

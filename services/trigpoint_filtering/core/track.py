@@ -1,8 +1,7 @@
 """A whole drive filtered: the online fold run over its series in order of time."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from functools import partial
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -16,7 +15,15 @@ from trigpoint.geodesy.projection import MapFrame, map_points_from_wgs84
 from trigpoint.geodesy.uncertainty import floored_covariance
 from trigpoint_filtering.core.estimator import Belief
 from trigpoint_filtering.core.motion import ANTENNA_X, ANTENNA_Y, HEADING, SPEED_SCALE, STATE_SIZE, X
-from trigpoint_filtering.core.online import Track, after_fix, after_imu, after_wheel, started_track
+from trigpoint_filtering.core.odometer import Odometer, after_imu_sample, after_wheel_sample
+from trigpoint_filtering.core.online import (
+    Track,
+    after_fix,
+    base_speed_mps,
+    is_step_due,
+    started_track,
+    with_odometer,
+)
 from trigpoint_filtering.settings import FilterSettings
 
 Floats = NDArray[np.float64]
@@ -75,56 +82,76 @@ def filter_drive(
     track = started_track(drive.described, boot_id=drive.boot_id, point_scale=frame.point_scale, settings=settings)
     recording = _Recording()
     total = len(drive.wheels.stamp_ns) + len(drive.imu.stamp_ns) + len(drive.fixes.stamp_ns)
-    for done, track in enumerate(_tracks(track, drive, frame)):
+    for done, track in _tracks(track, drive, frame):
         recording.take(track)
         if progress is not None and done % PROGRESS_EVERY == 0:
             progress(done, total)
     return recording.filtered(track)
 
 
-def _tracks(track: Track, drive: Drive, frame: MapFrame) -> Iterator[Track]:
-    """The track after each sample, sorted by time; at one stamp wheels come before IMU before fixes."""
-    steps = (_wheel_samples(drive), _imu_samples(drive), _fix_samples(drive, frame))
-    for kind in _kinds_in_order(drive):
-        track = next(steps[kind])(track)
-        yield track
+def _tracks(track: Track, drive: Drive, frame: MapFrame) -> Iterator[tuple[int, Track]]:
+    """The track whenever it took a step or a fix, with the number of samples gone into it.
+
+    The same functions as in the online fold; the samples between are folded into the odometer alone.
+    """
+    odometer, samples = track.odometer, (_wheel_rows(drive), _imu_rows(drive), _fix_rows(drive, frame))
+    for done, kind in enumerate(_kinds_in_order(drive)):
+        if kind == FIXES:
+            x_m, y_m, stamp_ns, sigma_m, sequence = next(samples[FIXES])
+            before = replace(track, odometer=odometer)
+            track = after_fix(
+                before, MapPosition(x_m, y_m), stamp_ns=int(stamp_ns), sigma_m=sigma_m, sequence=int(sequence)
+            )
+            odometer = track.odometer
+            yield done, track
+            continue
+        odometer = _with_sample(odometer, kind, next(samples[kind]))
+        if is_step_due(track.following, odometer):
+            track = with_odometer(track, odometer)
+            odometer = track.odometer
+            yield done, track
+
+
+WHEELS, IMU, FIXES = range(3)
+
+
+def _with_sample(odometer: Odometer, kind: int, row: tuple[float, ...]) -> Odometer:
+    if kind == WHEELS:
+        stamp_ns, speed_mps, steering_rad, yaw_rate_radps = row
+        return after_wheel_sample(
+            odometer, speed_mps, steering_rad=steering_rad, yaw_rate_radps=yaw_rate_radps, stamp_ns=int(stamp_ns)
+        )
+    stamp_ns, yaw_rate_radps = row
+    return after_imu_sample(odometer, yaw_rate_radps, stamp_ns=int(stamp_ns))
 
 
 def _kinds_in_order(drive: Drive) -> list[int]:
+    """Which series each sample comes from, sorted by time; at one stamp wheels before IMU before fixes."""
     series = (drive.wheels.stamp_ns, drive.imu.stamp_ns, drive.fixes.stamp_ns)
-    kind = np.repeat([0, 1, 2], [len(stamps) for stamps in series])
+    kind = np.repeat([WHEELS, IMU, FIXES], [len(stamps) for stamps in series])
     ordered: list[int] = kind[np.lexsort((kind, np.concatenate(series)))].tolist()
     return ordered
 
 
-def _wheel_samples(drive: Drive) -> Iterator[Callable[[Track], Track]]:
+def _rows(*columns: Floats | Ints) -> Iterator[tuple[float, ...]]:
+    return zip(*(column.tolist() for column in columns), strict=True)
+
+
+def _wheel_rows(drive: Drive) -> Iterator[tuple[float, ...]]:
     wheels = drive.wheels
-    columns = (wheels.speed_mps, wheels.steering_rad, wheels.yaw_rate_radps, wheels.stamp_ns)
-    for speed_mps, steering_rad, yaw_rate_radps, stamp_ns in zip(*(c.tolist() for c in columns), strict=True):
-        yield partial(
-            after_wheel,
-            speed_mps=speed_mps,
-            steering_rad=steering_rad,
-            yaw_rate_radps=yaw_rate_radps,
-            stamp_ns=stamp_ns,
-        )
+    return _rows(wheels.stamp_ns, wheels.speed_mps, wheels.steering_rad, wheels.yaw_rate_radps)
 
 
-def _imu_samples(drive: Drive) -> Iterator[Callable[[Track], Track]]:
-    for yaw_rate_radps, stamp_ns in zip(drive.imu.yaw_rate_radps.tolist(), drive.imu.stamp_ns.tolist(), strict=True):
-        yield partial(after_imu, yaw_rate_radps=yaw_rate_radps, stamp_ns=stamp_ns)
+def _imu_rows(drive: Drive) -> Iterator[tuple[float, ...]]:
+    return _rows(drive.imu.stamp_ns, drive.imu.yaw_rate_radps)
 
 
-def _fix_samples(drive: Drive, frame: MapFrame) -> Iterator[Callable[[Track], Track]]:
+def _fix_rows(drive: Drive, frame: MapFrame) -> Iterator[tuple[float, ...]]:
     fixes = drive.fixes
     if len(fixes.stamp_ns) == 0:
-        return
+        return iter(())
     point_m = map_points_from_wgs84(fixes.lat_deg, fixes.lon_deg, frame)
-    columns = (point_m, fixes.stamp_ns, fixes.sigma_m, fixes.sequence)
-    for (x_m, y_m), stamp_ns, sigma_m, sequence in zip(*(c.tolist() for c in columns), strict=True):
-        yield partial(
-            after_fix, position=MapPosition(x_m, y_m), stamp_ns=stamp_ns, sigma_m=sigma_m, sequence=sequence
-        )
+    return _rows(point_m[:, 0], point_m[:, 1], fixes.stamp_ns, fixes.sigma_m, fixes.sequence)
 
 
 @dataclass(slots=True)
@@ -157,7 +184,7 @@ class _Recording:
         self.stamp_ns.append(track.believed_ns)
         self.mean.append(belief.mean)
         self.covariance.append(belief.covariance[:SPEED_SCALE, :SPEED_SCALE])
-        self.speed_mps.append(track.speed_mps)
+        self.speed_mps.append(base_speed_mps(track))
 
     def filtered(self, track: Track) -> FilteredDrive:
         mean = np.array(self.mean).reshape(-1, STATE_SIZE)
