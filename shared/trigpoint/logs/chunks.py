@@ -65,7 +65,7 @@ def parsed(kind: Readable[RecordT], body: bytes) -> RecordT:
     """The record of this kind that the bytes hold. Raises LogDamaged if they hold none."""
     try:
         return kind.read(ReadDataStream(BytesIO(body)))
-    except (McapError, struct.error, UnicodeDecodeError) as error:
+    except (McapError, struct.error, UnicodeDecodeError, OverflowError) as error:
         raise LogDamaged(f"record of {len(body)} bytes cannot be read: {error or type(error).__name__}") from error
 
 
@@ -120,8 +120,11 @@ def _chunk(data: bytes, stamps_ns: Sequence[int]) -> Chunk:
     )
 
 
-def unpacked(chunk: Chunk) -> bytes:
-    """The chunk's records, checked. Raises LogDamaged for a wrong checksum or size, or more than CHUNK_LIMIT_BYTES."""
+def unpacked(chunk: Chunk, *, checksum_required: bool) -> bytes:
+    """The chunk's records, checked. A checksum of 0 means there is none, unless one is required.
+
+    Raises LogDamaged for a wrong checksum or size, or more than CHUNK_LIMIT_BYTES.
+    """
     try:
         compressed = chunk.compression == COMPRESSION
         said = (chunk.uncompressed_size, zstandard.frame_content_size(chunk.data) if compressed else 0)
@@ -129,11 +132,11 @@ def unpacked(chunk: Chunk) -> bytes:
             raise LogDamaged(f"chunk says it holds {max(said)} bytes, at most {CHUNK_LIMIT_BYTES} are unpacked")
         stream, size = get_chunk_data_stream(chunk, validate_crc=False)
         data: bytes = stream.read(size)
-    except (McapError, zstandard.ZstdError, RuntimeError, EOFError) as error:
+    except (McapError, zstandard.ZstdError, RuntimeError, EOFError, OverflowError) as error:
         raise LogDamaged(f"chunk of {len(chunk.data)} bytes does not decompress: {error}") from error
     if size != chunk.uncompressed_size:
         raise LogDamaged(f"chunk holds {size} bytes, its header says {chunk.uncompressed_size}")
-    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+    if (chunk.uncompressed_crc or checksum_required) and zlib.crc32(data) != chunk.uncompressed_crc:
         raise LogDamaged(f"chunk has checksum {zlib.crc32(data):08x}, its header says {chunk.uncompressed_crc:08x}")
     return data
 

@@ -201,7 +201,7 @@ def _chunk_data(file: BinaryIO, path: Path, chunk: CatalogChunk) -> bytes:
     try:
         if len(record) < chunk.length or FRAME.unpack_from(record) != (Opcode.CHUNK, chunk.length - FRAME.size):
             raise LogDamaged(f"no chunk of {chunk.length} bytes")
-        return unpacked(parsed(Chunk, record[FRAME.size :]))
+        return unpacked(parsed(Chunk, record[FRAME.size :]), checksum_required=True)
     except LogDamaged as error:
         raise LogDamaged(f"{path}, byte {chunk.offset}: {error}; {chunk.count} messages lost") from error
 

@@ -9,13 +9,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, DataEnd, Footer, MessageIndex, Metadata, MetadataIndex, Schema
+from mcap.records import Channel, Chunk, DataEnd, Footer, Header, MessageIndex, Metadata, MetadataIndex, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from trigpoint.errors import LogDamaged
 from trigpoint.logs.channels import ChannelKey, channel_key
-from trigpoint.logs.chunks import FRAME, definitions, messages, parsed, unpacked
+from trigpoint.logs.chunks import FRAME, definitions, messages, parsed, record_bytes, unpacked
 from trigpoint.logs.file_bytes import FileBytes
+from trigpoint.logs.mcap_writer import LIBRARY
 
 MAGIC = bytes(MCAP0_MAGIC)
 FOOTER_BYTES = FRAME.size + 8 + 8 + 4
@@ -68,6 +69,7 @@ class McapScan:
         self.damages: list[Damage] = []
         self.finished = False  # the data section has its end
         self.whole_end = 0  # where the last whole chunk ends, in bytes
+        self._checksums_required = False
         self._summary_fault = "no summary was read"
         self._channels_settled = False  # by the summary
         self._lost_chunk = False  # the last chunk was damaged: its message indexes tell its count
@@ -91,6 +93,7 @@ class McapScan:
     def chunks(self) -> Iterator[ScannedChunk]:
         """Every whole chunk, in the order of the file. A message outside of chunks counts as its own."""
         with FileBytes(self.path) as content:
+            self._checksums_required = _is_our_own(content)
             self._summary_fault = self._read_summary(content)
             offset = self._start(content)
             while not self.finished and offset < content.size_bytes:
@@ -144,7 +147,7 @@ class McapScan:
             (message,) = messages(record)
             return ScannedChunk(offset, len(record), message.log_time_ns, message.log_time_ns, record)
         chunk = parsed(Chunk, record[FRAME.size :])
-        data = unpacked(chunk)
+        data = unpacked(chunk, checksum_required=self._checksums_required)
         stamps_ns = [message.log_time_ns for message in messages(data)]
         held = min(stamps_ns, default=0), max(stamps_ns, default=0)
         self._learn(data)
@@ -197,7 +200,7 @@ class McapScan:
     def _end_of_data(self, content: FileBytes, offset: int, following: int) -> None:
         said = parsed(DataEnd, content.read(offset + FRAME.size, following)).data_section_crc
         held = content.checksum(0, offset)
-        if said not in (0, held) and not self.damages:
+        if said != held and (said or self._checksums_required) and not self.damages:
             self._damaged(offset, f"data section has checksum {held:08x}, its end says {said:08x}", lost=0)
         self.finished = True
         if self._summary_fault:
@@ -210,10 +213,10 @@ class McapScan:
         if tail[FOOTER_BYTES:] != MAGIC or FRAME.unpack_from(tail) != (Opcode.FOOTER, FOOTER_BYTES - FRAME.size):
             return "file does not end with a footer"
         footer = parsed(Footer, tail[FRAME.size : FOOTER_BYTES])
-        start = footer.summary_start or footer_start
+        start, said = footer.summary_start or footer_start, footer.summary_crc
         held = content.checksum(start, content.size_bytes - len(MAGIC) - 4)
-        if footer.summary_crc not in (0, held):
-            return f"summary has checksum {held:08x}, the footer says {footer.summary_crc:08x}"
+        if said != held and (said or self._checksums_required):
+            return f"summary has checksum {held:08x}, the footer says {said:08x}"
         if content.read(start - DATA_END_BYTES, start - 4) != FRAME.pack(Opcode.DATA_END, 4):
             return f"summary starts at {start}, no end of a data section stands before it"
         self._learn(content.read(start, footer_start))
@@ -224,13 +227,20 @@ class McapScan:
         self.damages.append(Damage(self.path, offset, reason, lost))
 
 
+def _is_our_own(content: FileBytes) -> bool:
+    """Whether the header names our writer, which gives everything a checksum; others may leave them out."""
+    head = Header(profile="", library=LIBRARY)
+    return content.read(len(MAGIC), len(MAGIC) + len(record_bytes(head))) == record_bytes(head)
+
+
 def _is_whole_chunk(content: FileBytes, offset: int) -> bool:
     head = content.read(offset, offset + FRAME.size)
     opcode, length = FRAME.unpack(head)
     if opcode != Opcode.CHUNK or offset + FRAME.size + length > content.size_bytes:
         return False
     try:
-        unpacked(parsed(Chunk, content.read(offset + FRAME.size, offset + FRAME.size + length)))
+        chunk = parsed(Chunk, content.read(offset + FRAME.size, offset + FRAME.size + length))
+        unpacked(chunk, checksum_required=False)
     except LogDamaged:
         return False
     return True

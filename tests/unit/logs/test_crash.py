@@ -5,6 +5,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+from mcap.reader import make_reader
 
 from event_examples.rows import imu_rows
 from trigpoint.errors import LogDamaged
@@ -73,6 +74,20 @@ def test_the_next_writer_ends_the_file_and_goes_on_with_the_numbers(crashed: Pat
     assert _append(crashed, 80, 90) == LogPosition(STREAM, 89)
     assert _sequences(crashed) == list(range(90))
     assert verify(crashed).findings == ()
+
+
+def test_a_mended_file_is_byte_for_byte_the_one_its_writer_would_have_ended(crashed: Path, tmp_path: Path) -> None:
+    with closing(McapLog(tmp_path / "orderly")) as log:
+        log.append(STREAM, imu_rows(0, 50))
+        log.append(STREAM, imu_rows(50, 80))
+    _append(crashed, 80, 81)
+    assert _file(crashed).read_bytes() == _file(tmp_path / "orderly").read_bytes()
+
+
+def test_a_mended_file_passes_the_mcap_reader_with_checksums(crashed: Path) -> None:
+    _append(crashed, 80, 81)
+    with _file(crashed).open("rb") as file:
+        assert sum(1 for _ in make_reader(file, validate_crcs=True).iter_messages()) == 80
 
 
 @pytest.mark.parametrize("torn_bytes", [1, 8, 200])

@@ -1,6 +1,8 @@
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from event_examples.one_each import ONE_OF_EACH
 from event_examples.rows import START_NS, STEP_NS, fix_row, imu_row, imu_rows
@@ -31,6 +33,13 @@ def small(tmp_path: Path) -> Path:
     anchors = [row for row in ONE_OF_EACH if isinstance(row.event, AnchorLabelled)]
     write_vehicle_log(path, anchors, vehicle="van")  # type: ignore[arg-type]
     return path
+
+
+@pytest.fixture
+def whole(tmp_path: Path) -> bytes:
+    path = tmp_path / "whole.mcap"
+    write_vehicle_log(path, imu_rows(0, 300), vehicle="van")  # type: ignore[arg-type]
+    return path.read_bytes()
 
 
 def test_a_whole_log_has_no_findings(directory: Path) -> None:
@@ -82,6 +91,26 @@ def _found(path: Path, content: bytes, offset: int) -> bool:
     flipped[offset] ^= 1 << (offset % 8)
     path.write_bytes(flipped)
     return bool(verify(path).findings)
+
+
+def test_a_checksum_set_to_zero_is_found_though_foreign_files_may_leave_it_out(small: Path) -> None:
+    content = small.read_bytes()
+    small.write_bytes(content[:-12] + bytes(4) + content[-8:])  # the footer ends with it, then comes the magic
+    assert "summary has checksum" in verify(small).findings[0].detail
+
+
+@given(data=st.data())
+@settings(
+    max_examples=100, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+def test_any_garbling_of_a_file_is_found_and_nothing_else_happens(
+    whole: bytes, tmp_path: Path, data: st.DataObject
+) -> None:
+    start = data.draw(st.integers(0, len(whole)))
+    stop = data.draw(st.integers(start, min(start + 100, len(whole))))
+    garbled = whole[:start] + data.draw(st.binary(max_size=100)) + whole[stop:]
+    (tmp_path / "garbled.mcap").write_bytes(garbled)
+    assert bool(verify(tmp_path / "garbled.mcap").findings) == (garbled != whole)
 
 
 def test_any_truncation_of_a_file_is_found(small: Path) -> None:
