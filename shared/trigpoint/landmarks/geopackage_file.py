@@ -3,6 +3,7 @@
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
+from json import JSONDecodeError
 from pathlib import Path
 
 from sqlalchemy import Connection, create_engine, text
@@ -32,11 +33,19 @@ def database_errors(path: Path) -> Iterator[None]:
     """SQLite's errors inside, with the file's name: InputError if the file is damaged or none, else ServiceError."""
     try:
         yield
+    except (UnicodeDecodeError, JSONDecodeError) as error:
+        raise InputError(f"{path} is not a sound database: {error}; delete it and replay the log") from error
     except (DatabaseError, sqlite3.DatabaseError) as error:
         cause = error.orig if isinstance(error, DatabaseError) else error
-        if getattr(cause, "sqlite_errorcode", None) in DAMAGE_CODES:
+        if _is_damage(cause):
             raise InputError(f"{path} is not a sound database: {cause}; delete it and replay the log") from error
         raise ServiceError(f"landmark database {path}: {cause}") from error
+
+
+def _is_damage(cause: BaseException | None) -> bool:
+    code = getattr(cause, "sqlite_errorcode", None)
+    undecodable = isinstance(cause, sqlite3.OperationalError) and code is None  # sqlite3's own: text that is not UTF-8
+    return undecodable or code in DAMAGE_CODES
 
 
 @contextmanager

@@ -164,6 +164,18 @@ def test_a_truncated_database_is_refused_with_the_way_out(log: MemoryLog, path: 
         replay_difference(log, path)
 
 
+@pytest.mark.parametrize(("text", "broken"), [(b'"veh-a/boot-1"', b'"veh-\xff/boot-1"'), (b'["veh-a"]', b"['veh-a'<")])
+def test_a_text_that_can_no_longer_be_read_is_damage(log: MemoryLog, path: Path, text: bytes, broken: bytes) -> None:
+    path.write_bytes(path.read_bytes().replace(text, broken))
+    with pytest.raises(InputError, match="landmarks.gpkg is not a sound database: .* delete it and replay the log"):
+        replay_difference(log, path)
+
+
+def test_a_flipped_bit_in_a_text_that_can_still_be_read_is_a_difference(log: MemoryLog, path: Path) -> None:
+    path.write_bytes(path.read_bytes().replace(b'"veh-a/boot-1"', b'"veh-A/boot-1"'))
+    assert "landmarks" in {difference.table for difference in replay_difference(log, path)}
+
+
 def test_an_empty_file_becomes_a_database(tmp_path: Path) -> None:
     (tmp_path / "landmarks.gpkg").touch()
     store = GeoPackageStore(tmp_path / "landmarks.gpkg")
