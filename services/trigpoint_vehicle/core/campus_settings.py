@@ -224,7 +224,7 @@ def with_plan(settings: CampusSettings, plan: str) -> CampusSettings:
     """The same campus with another plan of routes; one that avoids the quadrangle has labels elsewhere only."""
     imagery = settings.imagery
     if plan != "loop":
-        imagery = replace(imagery, labels_in_quadrangle=0, labels_beside_it=0)
+        imagery = replace(imagery, labels_in_quadrangle=0, labels_beside_it=0, beside_distance_m=0.0)
     return replace(settings, route=replace(settings.route, plan=plan), imagery=imagery)
 
 

@@ -36,7 +36,7 @@ def fix_errors_m(campus: Campus, vehicle_index: int) -> np.ndarray:
 
 
 def in_state(campus: Campus, vehicle_index: int, state: str) -> np.ndarray:
-    return np.array(campus.truth.fixes[vehicle_index].state) == state
+    return np.array([one == state for one in campus.truth.fixes[vehicle_index].state])
 
 
 def label_points_m(campus: Campus) -> np.ndarray:
