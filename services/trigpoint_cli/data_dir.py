@@ -1,0 +1,103 @@
+"""A data directory: where its log, its projections and what was made beside them stand."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+
+from trigpoint.errors import InputError
+from trigpoint.landmarks.geopackage_store import GeoPackageStore
+from trigpoint.logs.mcap_log import McapLog
+
+LOG_NAME = "log"
+
+
+@dataclass(frozen=True, slots=True)
+class DataDirectory:
+    """The paths of a data directory; truth stands apart from what the services see."""
+
+    path: Path
+
+    @property
+    def log(self) -> Path:
+        """The event log, the only truth there is; everything else can be made again from it."""
+        return self.path / LOG_NAME
+
+    @property
+    def database(self) -> Path:
+        """The landmark database."""
+        return self.path / "landmarks.gpkg"
+
+    @property
+    def report(self) -> Path:
+        """The report of the newest map version."""
+        return self.path / "report.html"
+
+    @property
+    def anchors(self) -> Path:
+        """A simulation's anchors, as a file to import."""
+        return self.path / "anchors.geojson"
+
+    @property
+    def truth(self) -> Path:
+        """A simulation's truth."""
+        return self.path / "truth" / "truth.csv"
+
+    @property
+    def vehicles(self) -> Path:
+        """The vehicles' own logs."""
+        return self.path / "vehicles"
+
+    @contextmanager
+    def opened_log(self) -> Iterator[McapLog]:
+        """The log, which has to be there with something in it. Raises InputError."""
+        if not self.path.is_dir():
+            raise InputError(f"{self.path}: no such data directory; `trigpoint ingest` makes one")
+        if not self.log.is_dir():
+            raise InputError(f"{self.path}: no log in there; `trigpoint ingest LOG --data {self.path}` makes one")
+        with self.new_log() as log:
+            if not log.streams():
+                raise InputError(f"{self.log}: the log is empty; `trigpoint ingest LOG --data {self.path}` fills it")
+            yield log
+
+    @contextmanager
+    def new_log(self) -> Iterator[McapLog]:
+        """The log, made where it is not there yet. Raises InputError if it cannot be."""
+        try:
+            log = McapLog(self.log)
+        except OSError as error:
+            raise InputError(f"{self.log}: no log can be opened here: {error}") from error
+        try:
+            yield log
+        finally:
+            log.close()
+
+    @contextmanager
+    def opened_database(self, *, read_only: bool) -> Iterator[GeoPackageStore]:
+        """The landmark database. Raises InputError where it is not there and only to be read."""
+        if read_only and not self.path.is_dir():
+            raise InputError(f"{self.path}: no such data directory; `trigpoint ingest` makes one")
+        if read_only and not self.database.is_file():
+            raise InputError(f"{self.database}: no landmark database; `trigpoint build --data {self.path}` makes one")
+        store = GeoPackageStore(self.database, read_only=read_only)
+        try:
+            yield store
+        finally:
+            store.close()
+
+
+def _directory(context: click.Context, parameter: click.Parameter, value: Path) -> DataDirectory:
+    return DataDirectory(value)
+
+
+data_option: Callable[[Any], Any] = click.option(
+    "--data",
+    required=True,
+    metavar="DIR",
+    type=click.Path(path_type=Path),
+    callback=_directory,
+    help="The data directory.",
+)

@@ -1,0 +1,106 @@
+"""`trigpoint demo`: a simulated campus, from raw logs to a georeferenced map, its errors and its report."""
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from trigpoint.errors import InputError
+from trigpoint_cli.build import map_values
+from trigpoint_cli.data_dir import DataDirectory
+from trigpoint_cli.ingest import ingest_values
+from trigpoint_cli.live import ingest_live
+from trigpoint_cli.output import Answer, JsonObject, Screen, answering, metres
+from trigpoint_cli.pipeline import Built, build_map
+from trigpoint_cli.report import write_report
+from trigpoint_cli.truth_values import truth_lines, truth_values
+from trigpoint_evaluation.app import TruthEvaluation
+from trigpoint_ingest.anchor_files import read_anchor_file
+from trigpoint_ingest.anchors import import_anchors
+from trigpoint_ingest.core.tally import IngestReport
+from trigpoint_vehicle.app import record_campus
+from trigpoint_vehicle.settings import SimulationSettings
+
+MARK = "trigpoint-demo"  # a file that says: this directory may be made anew
+DEFAULT_OUT = Path("trigpoint-demo")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Driven:
+    data: DataDirectory
+    ingest: IngestReport
+    built: Built
+
+
+@click.command("demo")
+@click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, metavar="DIR", help="Its data directory.")
+@click.option("--seed", type=int, default=1, show_default=True, metavar="N", help="Which campus.")
+@click.option("--vehicles", type=int, default=2, show_default=True, metavar="N", help="How many drive there.")
+@answering
+def command(out: Path, seed: int, vehicles: int, *, screen: Screen) -> Answer:
+    """Simulate a campus and take it all the way to a map, a report and its errors.
+
+    The vehicles' messages travel over Zenoh. DIR is a data directory afterwards: every other command works on it.
+    """
+    settings = SimulationSettings(seed=seed, vehicles=vehicles)
+    data = _emptied(out)
+    screen.note(f"simulating campus {seed} with {vehicles} vehicles")
+    logs = _simulated(settings, data)
+    with data.new_log() as log:
+        with screen.counting("driving, over Zenoh", unit="messages") as progress:
+            ingested = ingest_live(logs, log, progress)
+        import_anchors(read_anchor_file(data.anchors), log)
+        built = build_map(data, log, screen, method="anchored")
+        found = write_report(data, log, screen, truth_path=data.truth, solution=built.solution)
+    assert found is not None, "truth was written above"
+    return _answer(_Driven(data=data, ingest=ingested, built=built), found)
+
+
+def _answer(driven: _Driven, found: TruthEvaluation) -> Answer:
+    solved = driven.built.solution.map
+    values = map_values(solved) | {"ingest": ingest_values(driven.ingest), "report": str(driven.data.report)}
+    measured = truth_values(found)
+    values |= {name: value for name, value in measured.items() if name not in ("landmarks", "vehicles")}
+    values["landmarks"] = map_values(solved)["landmarks"] | measured["landmarks"]
+    values["vehicles"] = _vehicles(map_values(solved)["vehicles"], measured["vehicles"])
+    landmarks = found.landmarks
+    head = (
+        f"map version {solved.head.map_version}: {len(solved.landmarks)} landmarks from "
+        f"{driven.ingest.accepted} events, off by {metres(landmarks.error_m.mean)} on average"
+    )
+    return Answer(values, (head, *truth_lines(found), f"report: {driven.data.report}"), driven.ingest.complaints())
+
+
+def _vehicles(drives: JsonObject, errors: JsonObject) -> JsonObject:
+    return {name: {**drives.get(name, {}), **errors.get(name, {})} for name in sorted({*drives, *errors})}
+
+
+def _emptied(out: Path) -> DataDirectory:
+    """The directory without what an earlier demonstration left there. Raises InputError for anybody else's."""
+    data, mark = DataDirectory(out), out / MARK
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out}: a file is there; --out names a directory")
+    if out.is_dir() and any(out.iterdir()) and not mark.is_file():
+        raise InputError(f"{out}: the directory is not empty and not a demonstration's; choose another --out")
+    try:
+        for made in (data.log, data.vehicles, data.truth.parent):
+            shutil.rmtree(made, ignore_errors=True)
+        for file in (data.report, data.anchors, *out.glob(f"{data.database.name}*")):
+            file.unlink(missing_ok=True)
+        out.mkdir(parents=True, exist_ok=True)
+        mark.write_text("`trigpoint demo` made this directory and may make it anew.\n", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{out}: cannot be written: {error}") from error
+    return data
+
+
+def _simulated(settings: SimulationSettings, data: DataDirectory) -> tuple[Path, ...]:
+    """The vehicles' logs of a simulated campus; its truth goes where no service looks."""
+    written = record_campus(settings, data.vehicles)
+    if written.truth is None or written.anchors is None:
+        raise InputError(f"seed {settings.seed}: the simulation left no truth or no anchors")
+    data.truth.parent.mkdir(parents=True, exist_ok=True)
+    written.truth.replace(data.truth)
+    written.anchors.replace(data.anchors)
+    return written.logs

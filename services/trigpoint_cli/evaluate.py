@@ -1,0 +1,184 @@
+"""`trigpoint evaluate`: a map against withheld fixes, withheld anchors, or truth."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import click
+
+from trigpoint.errors import InputError
+from trigpoint.events.mapped import TrajectorySolved
+from trigpoint_cli.build import EDGES, METHODS, edges_of
+from trigpoint_cli.data_dir import DataDirectory, data_option
+from trigpoint_cli.output import Answer, JsonObject, Screen, answering, metres
+from trigpoint_cli.pipeline import Inputs, filter_drives, read_inputs, settings_for, solve, verdicts_of
+from trigpoint_cli.truth_values import truth_lines, truth_values
+from trigpoint_evaluation.app import Evaluated, evaluate_truth, logged_estimates, logged_map, read_truth
+from trigpoint_evaluation.core.draws import LeaveOutDraws, LeaveOutResult, left_out, left_out_curve
+from trigpoint_evaluation.core.gnss import (
+    FilteredPath,
+    GnssEvaluation,
+    Withholding,
+    evaluate_withheld,
+    withheld_fixes,
+    without_withheld,
+)
+from trigpoint_filtering.core.track import FilteredDrive
+from trigpoint_optimisation.core.solve import Solution
+from trigpoint_optimisation.settings import Method, SolveSettings
+
+
+@click.group("evaluate", help="Measure a map against withheld fixes, withheld anchors or truth.")
+def command() -> None:
+    """Group of the measures."""
+
+
+@command.command("gnss")
+@data_option
+@click.option("--withhold-period-s", "period_s", type=float, required=True, metavar="P")
+@click.option("--withhold-duration-s", "duration_s", type=float, required=True, metavar="D")
+@click.option("--withhold-offset-s", "offset_s", type=float, default=0.0, show_default=True, metavar="O")
+@click.option("--method", type=click.Choice(METHODS), help="Default: anchored where anchors are, else loose.")
+@click.option("--edges", type=click.Choice(EDGES), default="best", help="How fixes enter: as in the paper, or best.")
+@answering
+def gnss(data: DataDirectory, method: Method | None, edges: str, *, screen: Screen, **withhold: float) -> Answer:
+    """Solve without some fixes, then measure the antenna's distance to them.
+
+    Of every P seconds of a drive, D seconds of fixes are withheld, the first time O seconds after its start.
+    """
+    withholding = Withholding(**withhold)
+    with data.opened_log() as log:
+        inputs = read_inputs(log, screen)
+    settings = settings_for(method, inputs.anchors, edges=edges_of(edges))
+    total, vehicles = _withheld_evaluation(inputs, withholding, settings, screen)
+    values = _gnss_values(total) | {
+        "method": settings.method,
+        "edges": edges,
+        "vehicles": {one.vehicle: _gnss_values(one) for one in vehicles},
+    }
+    lines = [_gnss_line(one.vehicle, one) for one in vehicles] + [_gnss_line("all", total)]
+    return Answer(values, tuple(lines))
+
+
+def _withheld_evaluation(
+    inputs: Inputs, withholding: Withholding, settings: SolveSettings, screen: Screen
+) -> tuple[GnssEvaluation, tuple[GnssEvaluation, ...]]:
+    withheld = [withheld_fixes(drive, withholding, inputs.frame) for drive in inputs.drives]
+    if not any(len(fixes.stamp_ns) for fixes in withheld):
+        raise InputError(f"no fix of {len(inputs.drives)} drives falls into the withheld time: nothing to measure")
+    seen = replace(inputs, drives=tuple(without_withheld(drive, withholding) for drive in inputs.drives))
+    filtered = filter_drives(seen.drives, inputs.frame, screen)
+    solution = solve(seen, settings, screen, verdicts=verdicts_of(filtered), what="solving without them")
+    whole = filter_drives(inputs.drives, inputs.frame, screen)
+    with_all = solve(inputs, settings, screen, verdicts=verdicts_of(whole), what="solving with all fixes")
+    return evaluate_withheld(
+        withheld,
+        solved=_trajectories(solution),
+        solved_with_all=_trajectories(with_all),
+        filtered={(one.vehicle, one.boot_id): _path(one) for one in filtered},
+    )
+
+
+def _trajectories(solution: Solution) -> dict[tuple[str, str], TrajectorySolved]:
+    return {(one.vehicle, one.boot_id): one for one in solution.map.trajectories}
+
+
+def _path(filtered: FilteredDrive) -> FilteredPath:
+    return FilteredPath(
+        vehicle=filtered.vehicle,
+        boot_id=filtered.boot_id,
+        stamp_ns=filtered.stamp_ns,
+        pose=filtered.pose,
+        antenna_m=filtered.antenna_m,
+    )
+
+
+def _gnss_values(one: GnssEvaluation) -> JsonObject:
+    return {
+        "withheld": one.withheld,
+        "error_m": one.error_m,
+        "path_difference_m": one.path_difference_m,
+        "path_difference_everywhere_m": one.path_difference_everywhere_m,
+        "filter_error_m": one.filter_error_m,
+    }
+
+
+def _gnss_line(name: str, one: GnssEvaluation) -> str:
+    return (
+        f"{name}: {one.withheld} fixes withheld, antenna error median {metres(one.error_m.median)}, "
+        f"mean {metres(one.error_m.mean)}, p95 {metres(one.error_m.p95)}; between the paths "
+        f"{metres(one.path_difference_m.median)} median; filter alone {metres(one.filter_error_m.median)} median"
+    )
+
+
+@command.command("leave-out")
+@data_option
+@click.option("--tied", type=int, metavar="N", help="Tie so many anchors; every number of them by default.")
+@click.option("--draws", type=int, default=100, show_default=True, metavar="K")
+@click.option("--seed", type=int, default=0, show_default=True, metavar="S")
+@click.option("--image", metavar="ID", help="Tie and measure the labels of this image only, or of `most-labelled`.")
+@click.option("--blocked", is_flag=True, help="Hold out labels that lie together, not at random.")
+@click.option("--known-association", is_flag=True, help="Let signatures say which landmark a label is.")
+@answering
+def leave_out(
+    data: DataDirectory,
+    tied: int | None,
+    image: str | None,
+    known_association: bool,
+    *,
+    screen: Screen,
+    **draws: int,
+) -> Answer:
+    """Tie N anchors, measure the others: label minus landmark minus image offset, over K draws."""
+    settings = LeaveOutDraws(draws=draws["draws"], seed=draws["seed"], blocked=bool(draws["blocked"]))
+    with data.opened_log() as log:
+        inputs, verdicts = read_inputs(log, screen), logged_estimates(log).verdicts
+    chosen = settings_for("anchored", inputs.anchors, known_association=known_association)
+    reduction = solve(inputs, chosen, screen, verdicts=verdicts).reduction()
+    results: tuple[LeaveOutResult, ...]
+    if tied is not None:
+        results = (left_out(reduction, tied, settings, image=image),)
+    else:
+        with screen.part_of("leaving out") as progress:
+            results = left_out_curve(reduction, settings, image=image, progress=progress)
+    if not results:
+        raise InputError("no anchor is tied to a landmark: there is nothing to leave out")
+    values = _leave_out_values(results[-1]) | {"blocked": settings.blocked, "image": image}
+    if tied is None:
+        values["curve"] = [_leave_out_values(result) for result in results]
+    return Answer(values, tuple(map(_leave_out_line, results)))
+
+
+def _leave_out_values(result: LeaveOutResult) -> JsonObject:
+    return {
+        "tied": result.tied,
+        "anchors": {"count": result.count},
+        "draws": result.draws,
+        "undetermined": result.undetermined,
+        "error_m": result.error_m,
+        "band_m": {"p5": result.band_m[0], "p95": result.band_m[1]},
+    }
+
+
+def _leave_out_line(result: LeaveOutResult) -> str:
+    return (
+        f"{result.tied} of {result.count} tied: the others' error mean {metres(result.error_m.mean)}, "
+        f"p95 {metres(result.error_m.p95)}; {result.draws} draws, their means {metres(result.band_m[0])} to "
+        f"{metres(result.band_m[1])}"
+    )
+
+
+@command.command("truth")
+@data_option
+@click.option("--truth", "truth_path", required=True, type=click.Path(path_type=Path), metavar="FILE")
+@answering
+def truth(data: DataDirectory, truth_path: Path, *, screen: Screen) -> Answer:
+    """Measure the newest map version against truth; nothing is aligned first."""
+    known = read_truth(truth_path)
+    with data.opened_log() as log:
+        solved, verdicts = logged_map(log), logged_estimates(log).verdicts
+        inputs = read_inputs(log, screen)
+    evaluated = Evaluated(solved=solved, frame=inputs.frame, drives=inputs.drives, verdicts=verdicts)
+    found = evaluate_truth(evaluated, known)
+    if found.landmarks.error_m.count == 0 and found.paths.error_m.count == 0:
+        raise InputError(f"{truth_path}: nothing in it is near anything in the map: no error can be measured")
+    return Answer(truth_values(found) | {"map_version": solved.head.map_version}, truth_lines(found))

@@ -1,0 +1,95 @@
+"""`trigpoint log`: what log files hold, and whether they are whole."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import click
+
+from trigpoint.logs.verification import FileSummary, Finding, Verification, verify
+from trigpoint_cli.data_dir import LOG_NAME
+from trigpoint_cli.output import Answer, JsonObject, Screen, answering
+
+NS_PER_S = 1e9
+
+
+@click.group("log", help="What log files hold, and whether they are whole.")
+def command() -> None:
+    """Group of what can be asked of log files."""
+
+
+def _verified(path: Path) -> Verification:
+    inside = path / LOG_NAME
+    return verify(inside if inside.is_dir() else path)
+
+
+def _file_values(file: FileSummary) -> JsonObject:
+    return {
+        "path": str(file.path),
+        "stream": file.stream,
+        "size_bytes": file.size_bytes,
+        "count": file.count,
+        "start_ns": file.start_ns,
+        "end_ns": file.end_ns,
+        "vehicles": list(file.vehicles),
+        "topics": [{"topic": topic.topic, "schema": topic.schema_name, "count": topic.count} for topic in file.topics],
+        "metadata": {name: dict(record) for name, record in file.metadata.items()},
+    }
+
+
+def _finding_values(finding: Finding) -> JsonObject:
+    return {
+        "path": str(finding.path),
+        "offset": finding.offset,
+        "kind": finding.kind,
+        "detail": finding.detail,
+        "lost_messages": finding.lost_messages,
+    }
+
+
+def _line(finding: Finding) -> str:
+    return f"{finding.path}, byte {finding.offset}: {finding.kind}: {finding.detail}"
+
+
+def _utc(stamp_ns: int) -> str:
+    return datetime.fromtimestamp(stamp_ns / NS_PER_S, tz=UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+@command.command("info")
+@click.argument("path", metavar="DIR", type=click.Path(path_type=Path))
+@answering
+def info(path: Path, *, screen: Screen) -> Answer:
+    """What the log files in DIR (a data directory, a log, a folder or one file) hold."""
+    found = _verified(path)
+    count = sum(file.count for file in found.files)
+    lines = [
+        f"{file.stream}: {file.count} events, {file.size_bytes / 1e6:.1f} MB, {_utc(file.start_ns)} to "
+        f"{_utc(file.end_ns)}, {', '.join(sorted({topic.schema_name for topic in file.topics}))}"
+        for file in found.files
+    ]
+    values = {
+        "count": count,
+        "files": [_file_values(file) for file in found.files],
+        "boots": [
+            {"source": boot.source, "boot_id": boot.boot_id, "count": boot.count, "missing": boot.missing}
+            for boot in found.boots
+        ],
+        "findings": [_finding_values(finding) for finding in found.findings],
+    }
+    return Answer(values, (*lines, f"{count} events in {len(found.files)} files", *map(_line, found.findings)))
+
+
+@command.command("verify")
+@click.argument("path", metavar="DIR", type=click.Path(path_type=Path))
+@answering
+def verify_command(path: Path, *, screen: Screen) -> Answer:
+    """Check every checksum, chunk, number and identity of the log files in DIR; status 2 if anything is wrong."""
+    found = _verified(path)
+    count = sum(file.count for file in found.files)
+    values = {
+        "whole": not found.findings,
+        "count": count,
+        "files": len(found.files),
+        "findings": [_finding_values(finding) for finding in found.findings],
+    }
+    lines = (f"{count} events in {len(found.files)} files, {len(found.findings)} findings",)
+    return Answer(values, lines, tuple(map(_line, found.findings)))

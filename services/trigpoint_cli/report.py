@@ -1,0 +1,3 @@
+"""`trigpoint report`: the newest map version as one page."""
+
+CURVE_DRAWS = 200

@@ -1,0 +1,7 @@
+"""Says how good a map is: against withheld fixes, withheld labels and truth; and shows it in a report.
+
+Reads: VehicleDescribed, WheelSpeedMeasured, WheelPairMeasured, ImuMeasured, GnssFixReceived, LandmarksDetected,
+EventRefused, MapFramePinned, AnchorLabelled, FixJudged, PoseFiltered, GateAlarmed, TrajectorySolved,
+LandmarkSolved, AnchorAssociated, ImageOffsetSolved, MapSolved
+Writes: (nothing)
+"""

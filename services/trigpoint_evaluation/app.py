@@ -1,0 +1,206 @@
+"""Reads what a log holds of drives, anchors and map versions, and measures it against truth."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trigpoint.errors import InputError
+from trigpoint.events.corrected import AnchorLabelled
+from trigpoint.events.drives import Drive, drives_of
+from trigpoint.events.envelope import Envelope
+from trigpoint.events.estimated import Estimated, FixJudged, GateAlarmed, PoseFiltered
+from trigpoint.events.keys import STREAM_PATTERNS
+from trigpoint.events.mapped import Mapped, MapSolved
+from trigpoint.events.observed import EventRefused, MapFramePinned, Observed, VehicleDescribed
+from trigpoint.events.solved import SolvedMap, solved_maps
+from trigpoint.events.truth import Truth, truth_from_lines
+from trigpoint.geodesy.positions import GridPosition
+from trigpoint.geodesy.projection import MapFrame, map_points_from_wgs84, pin_map_frame
+from trigpoint.logs.ports import EventLog
+from trigpoint_evaluation.core.consistency import GateTruth, JudgedFixes, gate_truth, judged_fixes
+from trigpoint_evaluation.core.landmark_truth import (
+    MATCH_LIMIT_M,
+    LandmarkTruthEvaluation,
+    MappedPoints,
+    evaluate_landmarks,
+)
+from trigpoint_evaluation.core.path_truth import PathTruthEvaluation, evaluate_paths
+
+Floats = NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+VEHICLE_PREFIX = STREAM_PATTERNS[VehicleDescribed].partition("{")[0]
+MAP_STREAM, MAPPED_STREAM = STREAM_PATTERNS[MapFramePinned], STREAM_PATTERNS[MapSolved]
+LABEL_STREAM, REFUSED_STREAM = STREAM_PATTERNS[AnchorLabelled], STREAM_PATTERNS[EventRefused]
+ESTIMATED_STREAM = STREAM_PATTERNS[FixJudged]
+PROGRESS_COUNT = 5000  # events between two calls
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StampedPose:
+    """A filtered pose and its time."""
+
+    stamp_ns: int
+    pose: PoseFiltered
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoggedEstimates:
+    """What filtering said: a verdict a fix, poses and alarms."""
+
+    verdicts: tuple[FixJudged, ...]
+    poses: tuple[StampedPose, ...]
+    alarms: tuple[GateAlarmed, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evaluated:
+    """A map version and what it was made from, in the map frame."""
+
+    solved: SolvedMap
+    frame: MapFrame
+    drives: tuple[Drive, ...]
+    verdicts: tuple[FixJudged, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TruthEvaluation:
+    """A map version against truth. Parts without truth have no errors (count 0)."""
+
+    landmarks: LandmarkTruthEvaluation
+    paths: PathTruthEvaluation
+    vehicles: tuple[PathTruthEvaluation, ...]
+    gate: GateTruth
+
+
+def no_progress(done: int, total: int) -> None:
+    """Hears of progress, and does nothing."""
+
+
+def logged_frame(log: EventLog) -> MapFrame:
+    """The map's pinned frame. Raises InputError where nothing has pinned one."""
+    for row in log.read(MAP_STREAM, kinds=(MapFramePinned,)):
+        event = row.envelope.event
+        if isinstance(event, MapFramePinned):
+            return pin_map_frame(crs=event.crs, origin=GridPosition(event.origin_easting_m, event.origin_northing_m))
+    raise InputError("the log pins no map frame: it has no GNSS fix, no declared origin and no anchor")
+
+
+def logged_drives(log: EventLog, *, progress: Progress = no_progress) -> tuple[Drive, ...]:
+    """Every drive in the log. Raises InputError where there is none."""
+    streams = [stream for stream in log.streams() if stream.startswith(VEHICLE_PREFIX)]
+    total = sum(log.next_number(stream) for stream in streams)
+    rows: list[Envelope[Observed]] = []
+    for stream in streams:
+        for logged in log.read(stream):
+            rows.append(cast(Envelope[Observed], logged.envelope))
+            if len(rows) % PROGRESS_COUNT == 0:
+                progress(len(rows), total)
+    if not rows:
+        raise InputError("the log holds no vehicle's events: nothing was ingested yet")
+    progress(total, total)
+    return drives_of(rows)
+
+
+def logged_anchors(log: EventLog) -> tuple[AnchorLabelled, ...]:
+    """The anchors in force: of several labels of one name in one image the last."""
+    events = [row.envelope.event for row in log.read(LABEL_STREAM, kinds=(AnchorLabelled,))]
+    in_force = {(event.anchor, event.image): event for event in events if isinstance(event, AnchorLabelled)}
+    return tuple(in_force.values())
+
+
+def logged_maps(log: EventLog) -> tuple[SolvedMap, ...]:
+    """Every complete map version."""
+    return solved_maps(cast(Mapped, row.envelope.event) for row in log.read(MAPPED_STREAM))
+
+
+def logged_map(log: EventLog) -> SolvedMap:
+    """The newest map version. Raises InputError where there is none."""
+    maps = logged_maps(log)
+    if not maps:
+        raise InputError("the log holds no map version: build one first")
+    return maps[-1]
+
+
+def logged_refusals(log: EventLog) -> tuple[EventRefused, ...]:
+    """Every message that was refused."""
+    events = (row.envelope.event for row in log.read(REFUSED_STREAM, kinds=(EventRefused,)))
+    return tuple(event for event in events if isinstance(event, EventRefused))
+
+
+def logged_estimates(log: EventLog) -> LoggedEstimates:
+    """What filtering appended; of a fix judged twice the last verdict counts."""
+    verdicts: dict[tuple[str, str, int], FixJudged] = {}
+    poses: dict[tuple[str, str, int], StampedPose] = {}
+    alarms = []
+    for row in log.read(ESTIMATED_STREAM):
+        event, stamp_ns = cast(Estimated, row.envelope.event), row.envelope.stamp_ns
+        if isinstance(event, FixJudged):
+            verdicts[event.vehicle, event.boot_id, event.fix_sequence] = event
+        elif isinstance(event, PoseFiltered):
+            poses[event.vehicle, event.boot_id, stamp_ns] = StampedPose(stamp_ns=stamp_ns, pose=event)
+        else:
+            alarms.append(event)
+    return LoggedEstimates(verdicts=tuple(verdicts.values()), poses=tuple(poses.values()), alarms=tuple(alarms))
+
+
+def read_truth(path: Path) -> Truth:
+    """The truth in a file. Raises InputError if it cannot be read as that."""
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            return truth_from_lines(file)
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: truth cannot be read: {error}") from error
+
+
+def mapped_points(solved: SolvedMap) -> MappedPoints:
+    """A map version's landmarks as arrays, in its order."""
+    landmarks = solved.landmarks
+    return MappedPoints(
+        point_m=np.array([one.position_m for one in landmarks]).reshape(-1, 2),
+        signature=tuple(one.signature for one in landmarks),
+        covariance_m2=np.array([one.covariance_m2 for one in landmarks]).reshape(-1, 2, 2),
+    )
+
+
+def true_points(truth: Truth, frame: MapFrame) -> MappedPoints:
+    """The true landmarks in the map frame."""
+    lat_deg = np.array([one.lat_deg for one in truth.landmarks])
+    lon_deg = np.array([one.lon_deg for one in truth.landmarks])
+    point_m = map_points_from_wgs84(lat_deg, lon_deg, frame) if len(lat_deg) else np.zeros((0, 2))
+    return MappedPoints(point_m=point_m, signature=tuple(one.signature for one in truth.landmarks))
+
+
+def judged(drives: Sequence[Drive], verdicts: Sequence[FixJudged]) -> tuple[JudgedFixes, ...]:
+    """Every drive's verdicts beside its fixes."""
+    return tuple(judged_fixes(drive, verdicts) for drive in drives)
+
+
+def evaluate_truth(
+    evaluated: Evaluated,
+    truth: Truth,
+    *,
+    joint_covariance_m2: Floats | None = None,
+    match_limit_m: float = MATCH_LIMIT_M,
+) -> TruthEvaluation:
+    """A map version's landmarks and paths, and the filter's verdicts, against truth; nothing is aligned first.
+
+    joint_covariance (2n, 2n) in m^2, x and y of each of the map's landmarks in turn.
+    """
+    solved, frame, drives = evaluated.solved, evaluated.frame, evaluated.drives
+    paths, vehicles = evaluate_paths(solved.trajectories, drives, truth, frame)
+    return TruthEvaluation(
+        landmarks=evaluate_landmarks(
+            mapped_points(solved),
+            true_points(truth, frame),
+            joint_covariance_m2=joint_covariance_m2,
+            limit_m=match_limit_m,
+        ),
+        paths=paths,
+        vehicles=vehicles,
+        gate=gate_truth(judged(drives, evaluated.verdicts), truth.fixes),
+    )

@@ -1,0 +1,1 @@
+"""Measures of a map, as functions of their arguments."""
