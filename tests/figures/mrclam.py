@@ -3,6 +3,7 @@
 from statistics import fmean
 
 from figures.figure import Figure, Measurement, at_most
+from figures.replayed import unchanged_by_replay
 from figures.workbench import Outcome, Workbench
 
 DRAWS = 100
@@ -43,6 +44,7 @@ def trajectory_rmse(bench: Workbench) -> Measurement:
 
 
 FIGURES = (
+    unchanged_by_replay("data", built),
     left_out(3, 0.05),
     left_out(8, 0.04),
     Figure(

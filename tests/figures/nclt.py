@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from figures.figure import Figure, Measurement, at_most
+from figures.replayed import unchanged_by_replay
 from figures.workbench import Outcome, Workbench
 
 MANIFEST = Path(__file__).with_name("nclt.toml")
@@ -12,8 +13,7 @@ SESSIONS = (("nclt-2012-11-04", 0.65), ("nclt-2013-01-10", 1.0))  # the share of
 def against_truth(bench: Workbench) -> Outcome:
     """What `evaluate truth` says of the loose map of both sessions."""
     raw, data = bench.path("raw"), bench.path("data")
-    bench.drive("nclt")
-    bench.run("convert", "table", str(MANIFEST), raw)
+    bench.run("convert", "table", str(MANIFEST), raw, "--source-dir", bench.drive("nclt"))
     bench.run("ingest", *(f"{raw}/{session}.mcap" for session, _ in SESSIONS), "--data", data)
     bench.run("build", "--data", data, "--method", "loose", "--json")
     return bench.run("evaluate", "truth", "--data", data, "--truth", f"{raw}/truth.csv", "--json")
@@ -43,4 +43,8 @@ def largest(session: str) -> Figure:
     return Figure(name=f"{session}: largest error anywhere", unit="m", target=at_most(30.0), measure=measure)
 
 
-FIGURES = (*(share_left(*session) for session in SESSIONS), *(largest(session) for session, _ in SESSIONS))
+FIGURES = (
+    *(share_left(*session) for session in SESSIONS),
+    *(largest(session) for session, _ in SESSIONS),
+    unchanged_by_replay("data", against_truth),
+)
