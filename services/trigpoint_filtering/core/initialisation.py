@@ -31,22 +31,28 @@ Floats = NDArray[np.float64]
 
 MAX_PAIRS = 64  # bounds memory and work
 PAIR_SPACING_M = 1.0  # of antenna way between pairs: fixes at standstill say nothing new
-MIN_PAIRS = 5
+MIN_PAIRS = 6
+WINDOWS = (6, 8, 12, 16, 24, 32, 48, 64)  # newest pairs tried, fewest first: dead reckoning drifts
 MAX_OUTLIER_SHARE = 0.3
 INLIER_SIGMAS = 3.0
-MAX_HEADING_SIGMA_RAD = 0.12  # the unscented filter converges from well beyond this
+MAX_HEADING_SIGMA_RAD = 0.3  # the unscented filter converges from beyond this
 CORRELATION_INFLATION = 2.0  # of the heading's sigma: consecutive fixes share their error
 HEADING_SIGMA_FLOOR_RAD = 0.02
+NEWEST_DRIFT_SHARE = 0.6  # of a stretch's drift is what its end differs from its mean: 1/sqrt(3)
 
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """A fix in the map frame, and the antenna where dead reckoning put it, metres."""
+    """A fix in the map frame, and the antenna where dead reckoning put it, metres.
+
+    `drift_rad2`: variance of the dead-reckoned heading by then.
+    """
 
     fix_x_m: float
     fix_y_m: float
     antenna_x_m: float
     antenna_y_m: float
+    drift_rad2: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +61,7 @@ class Seeker:
 
     T_local_base: Pose2
     pairs: tuple[Pair, ...] = ()
+    drift_rad2: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +77,7 @@ class Alignment:
 def after_pair(seeker: Seeker, fix_m: Floats, *, antenna: Pose2) -> Seeker:
     """The seeker with one more fix (2,); the newest pair is replaced until the antenna has moved on."""
     at = seeker.T_local_base.compose(antenna)
-    pair = Pair(float(fix_m[0]), float(fix_m[1]), at.x_m, at.y_m)
+    pair = Pair(float(fix_m[0]), float(fix_m[1]), at.x_m, at.y_m, seeker.drift_rad2)
     kept = seeker.pairs
     if len(kept) > 1 and _way_m(kept[-2], pair) < PAIR_SPACING_M:
         kept = kept[:-1]
@@ -82,21 +89,37 @@ def _way_m(first: Pair, second: Pair) -> float:
 
 
 def aligned(seeker: Seeker, *, sigma_m: float) -> Alignment:
-    """The alignment of a seeker's pairs, fixes beyond 3 `sigma_m` left out one by one.
+    """The alignment of a seeker's newest pairs, as few as fix the heading; `sigma_m` of one fix, white.
 
     Raises AlignmentRefused while pairs are few, the way is too short for a heading, or fixes disagree.
     """
     if len(seeker.pairs) < MIN_PAIRS:
         raise AlignmentRefused(f"{len(seeker.pairs)} fixes along the way: {MIN_PAIRS} are needed")
-    rows = np.array([(p.fix_x_m, p.fix_y_m, p.antenna_x_m, p.antenna_y_m) for p in seeker.pairs])
+    for count in WINDOWS:
+        try:
+            return _aligned_pairs(seeker.pairs[-count:], sigma_m)
+        except AlignmentRefused:
+            if count >= len(seeker.pairs):
+                raise
+    raise AssertionError("the last window holds every pair")
+
+
+def _aligned_pairs(pairs: tuple[Pair, ...], sigma_m: float) -> Alignment:
+    """The alignment of pairs; fixes that lie too far off are left out one by one."""
+    rows = np.array([(p.fix_x_m, p.fix_y_m, p.antenna_x_m, p.antenna_y_m) for p in pairs])
+    drift_rad = math.sqrt(pairs[-1].drift_rad2 - pairs[0].drift_rad2)
     newest, kept = rows[-1], rows
+    way_m = float(np.sum(np.hypot(*np.diff(rows[:, 2:], axis=0).T)))
+    allowed_m = INLIER_SIGMAS * math.hypot(sigma_m, 0.25 * drift_rad * way_m)
     for _ in range(int(MAX_OUTLIER_SHARE * len(rows)) + 1):
-        alignment, residual_m = _least_squares(kept, sigma_m)
+        alignment, residual_m = _least_squares(kept, sigma_m, drift_rad)
         worst = int(np.argmax(residual_m))
-        if residual_m[worst] <= INLIER_SIGMAS * sigma_m:
+        if residual_m[worst] <= allowed_m:
             return _usable(alignment, kept, newest)
         kept = np.delete(kept, worst, axis=0)
-    raise AlignmentRefused(f"fixes disagree with the way driven by {residual_m[worst]:.1f} m: {3 * sigma_m:.1f} m is the limit")
+    raise AlignmentRefused(
+        f"fixes disagree with the way driven by {residual_m[worst]:.1f} m: {allowed_m:.1f} m is the limit"
+    )
 
 
 def _usable(alignment: Alignment, kept: Floats, newest: Floats) -> Alignment:
@@ -104,12 +127,12 @@ def _usable(alignment: Alignment, kept: Floats, newest: Floats) -> Alignment:
         raise AlignmentRefused(
             f"heading known to {alignment.heading_sigma_rad:.2f} rad only: {MAX_HEADING_SIGMA_RAD} rad is the limit"
         )
-    if not np.array_equal(kept[-1], newest) or len(kept) < MIN_PAIRS:
+    if not np.array_equal(kept[-1], newest) or len(kept) < MIN_PAIRS - 1:
         raise AlignmentRefused(f"the newest fix does not fit the {len(kept)} that agree")
     return alignment
 
 
-def _least_squares(rows: Floats, sigma_m: float) -> tuple[Alignment, Floats]:
+def _least_squares(rows: Floats, sigma_m: float, drift_rad: float) -> tuple[Alignment, Floats]:
     """The rigid motion of the plane from antenna to fix (Umeyama 1991, without scale), and residuals (n,) in m."""
     fix_mean, antenna_mean = rows[:, :2].mean(axis=0), rows[:, 2:].mean(axis=0)
     fix, antenna = rows[:, :2] - fix_mean, rows[:, 2:] - antenna_mean
@@ -123,7 +146,8 @@ def _least_squares(rows: Floats, sigma_m: float) -> tuple[Alignment, Floats]:
     sigma_rad = CORRELATION_INFLATION * sigma_m / spread_m if spread_m > 0.0 else math.inf
     length = np.hypot(residual[:, 0], residual[:, 1])
     scatter_m = math.sqrt(float(np.mean(length**2)) / 2.0)
-    return Alignment(T_map_local, math.hypot(sigma_rad, HEADING_SIGMA_FLOOR_RAD), scatter_m, len(rows)), length
+    heading_sigma_rad = math.hypot(sigma_rad, HEADING_SIGMA_FLOOR_RAD, drift_rad * NEWEST_DRIFT_SHARE)
+    return Alignment(T_map_local, heading_sigma_rad, scatter_m, len(rows)), length
 
 
 def prior_calibration(source: TurnSource, geometry: Geometry, *, antenna_sigma_m: float) -> Belief:

@@ -38,6 +38,7 @@ class Pending:
     way_m: float = 0.0
     turn: float = 0.0
     blind_s: float = 0.0
+    longest_s: float = 0.0
     standing: bool = True
 
 
@@ -59,63 +60,53 @@ class Odometer:
 def after_wheel_sample(
     odometer: Odometer, speed_mps: float, *, steering_rad: float, yaw_rate_radps: float, stamp_ns: int
 ) -> Odometer:
-    """The odometer after a wheel sample: the way since the last sample at the mean of both; NaN where not measured."""
+    """The odometer after a wheel sample, which holds for the time since the last; NaN where not measured.
+
+    Wheels count pulses over the interval that ends at their stamp.
+    """
     if not math.isfinite(speed_mps):
         return odometer
-    stale = stamp_ns - odometer.wheel.stamp_ns > WHEEL_STALE_S / SECONDS_PER_NS
-    before = WheelSample(stamp_ns, speed_mps, steering_rad, yaw_rate_radps) if stale else odometer.wheel
-    mean = WheelSample(
-        odometer.wheel.stamp_ns,
-        0.5 * (before.speed_mps + speed_mps),
-        _mean_with(before.steering_rad, steering_rad),
-        _mean_with(before.yaw_rate_radps, yaw_rate_radps),
-    )
     newest = WheelSample(max(stamp_ns, odometer.wheel.stamp_ns), speed_mps, steering_rad, yaw_rate_radps)
-    pending, source = _after(odometer, mean, odometer.imu, stamp_ns)
-    newest_ns = max(stamp_ns, odometer.stamp_ns)
-    return Odometer(odometer.has_wheelbase, newest_ns, newest, odometer.imu, pending, source)
+    return _advanced(odometer, newest, odometer.imu, stamp_ns)
 
 
 def after_imu_sample(odometer: Odometer, yaw_rate_radps: float, *, stamp_ns: int) -> Odometer:
-    """The odometer after an IMU sample: the turn since the last sample at the mean of both."""
+    """The odometer after an IMU sample, which holds for the time since the last."""
     if not math.isfinite(yaw_rate_radps):
         return odometer
-    mean = ImuSample(odometer.imu.stamp_ns, _mean_with(odometer.imu.yaw_rate_radps, yaw_rate_radps))
     newest = ImuSample(max(stamp_ns, odometer.imu.stamp_ns), yaw_rate_radps)
-    pending, source = _after(odometer, odometer.wheel, mean, stamp_ns)
-    newest_ns = max(stamp_ns, odometer.stamp_ns)
-    return Odometer(odometer.has_wheelbase, newest_ns, odometer.wheel, newest, pending, source)
+    return _advanced(odometer, odometer.wheel, newest, stamp_ns)
 
 
 def advanced(odometer: Odometer, stamp_ns: int) -> Odometer:
     """The odometer with its present speed and turn kept up until a stamp; the same for one in the past."""
-    pending, source = _after(odometer, odometer.wheel, odometer.imu, stamp_ns)
+    return _advanced(odometer, odometer.wheel, odometer.imu, stamp_ns)
+
+
+def _advanced(odometer: Odometer, wheel: WheelSample, imu: ImuSample, stamp_ns: int) -> Odometer:
+    """The odometer with `wheel` and `imu` as its samples, held from its own stamp until another."""
     newest_ns = max(stamp_ns, odometer.stamp_ns)
-    return Odometer(odometer.has_wheelbase, newest_ns, odometer.wheel, odometer.imu, pending, source)
+    pending, source = odometer.pending, odometer.source
+    if 0 <= odometer.stamp_ns < stamp_ns and odometer.wheel.stamp_ns >= 0:
+        source = source if pending.s > 0.0 else _turn_source(wheel, imu, odometer.has_wheelbase, stamp_ns)
+        pending = _longer(odometer, wheel, imu, source, stamp_ns) if source else pending
+    return Odometer(odometer.has_wheelbase, newest_ns, wheel, imu, pending, source)
 
 
-def _after(
-    odometer: Odometer, wheel: WheelSample, imu: ImuSample, stamp_ns: int
-) -> tuple[Pending, TurnSource | None]:
-    """What is pending once `wheel` and `imu` have held from the odometer's stamp until another."""
+def _longer(odometer: Odometer, wheel: WheelSample, imu: ImuSample, source: TurnSource, stamp_ns: int) -> Pending:
     before = odometer.pending
-    if odometer.stamp_ns < 0 or wheel.stamp_ns < 0 or stamp_ns <= odometer.stamp_ns:
-        return before, odometer.source
-    source = odometer.source if before.s > 0.0 else _turn_source(odometer, wheel, stamp_ns)
-    if source is None:
-        return before, source
     dt_s = (stamp_ns - odometer.stamp_ns) * SECONDS_PER_NS
     turn = _turn(wheel, imu, source)
-    silent = (stamp_ns - wheel.stamp_ns) * SECONDS_PER_NS - WHEEL_STALE_S
+    silent_s = (stamp_ns - odometer.wheel.stamp_ns) * SECONDS_PER_NS
     standing = abs(wheel.speed_mps) < STANDING_MPS and (source is TurnSource.STEERING or abs(turn) < STANDING_RADPS)
-    pending = Pending(
+    return Pending(
         before.s + dt_s,
         before.way_m + wheel.speed_mps * dt_s,
         before.turn + turn * dt_s,
-        before.blind_s + min(max(silent, 0.0), dt_s),
+        before.blind_s + min(max(silent_s - WHEEL_STALE_S, 0.0), dt_s),
+        max(before.longest_s, dt_s),
         before.standing and standing,
     )
-    return pending, source
 
 
 def silent_s(odometer: Odometer, stamp_ns: int) -> float:
@@ -134,20 +125,16 @@ def taken_step(odometer: Odometer) -> tuple[MotionStep | None, Odometer]:
         pending.turn / pending.s,
         odometer.source,
         pending.blind_s,
+        pending.longest_s,
         pending.standing and pending.blind_s == 0.0,
     )
     return step, replace(odometer, pending=NOTHING_PENDING)
 
 
-def _mean_with(before: float, after: float) -> float:
-    return after if math.isnan(before) or math.isnan(after) else 0.5 * (before + after)
-
-
-def _turn_source(odometer: Odometer, wheel: WheelSample, stamp_ns: int) -> TurnSource | None:
-    imu_ns = odometer.imu.stamp_ns
-    if imu_ns >= 0 and (stamp_ns - imu_ns) * SECONDS_PER_NS <= IMU_STALE_S:
+def _turn_source(wheel: WheelSample, imu: ImuSample, has_wheelbase: bool, stamp_ns: int) -> TurnSource | None:
+    if imu.stamp_ns >= 0 and (stamp_ns - imu.stamp_ns) * SECONDS_PER_NS <= IMU_STALE_S:
         return TurnSource.IMU
-    if odometer.has_wheelbase and math.isfinite(wheel.steering_rad):
+    if has_wheelbase and math.isfinite(wheel.steering_rad):
         return TurnSource.STEERING
     return TurnSource.WHEELS if math.isfinite(wheel.yaw_rate_radps) else None
 

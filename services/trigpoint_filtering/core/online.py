@@ -40,6 +40,7 @@ from trigpoint_filtering.core.motion import (
     base_motion,
     geometry_of,
     moved,
+    step_variance,
 )
 from trigpoint_filtering.core.odometer import (
     Odometer,
@@ -217,7 +218,17 @@ def _reckoned(track: Track, step: MotionStep) -> Seeker | None:
     state = _best_calibration(track).mean.copy()
     state[[X, Y, HEADING]] = at.x_m, at.y_m, at.heading_rad
     after = moved(state[None, :], step, track.following.geometry, bias_time_s=track.noise.bias_time_s)[0]
-    return replace(track.seeker, T_local_base=Pose2(float(after[X]), float(after[Y]), float(after[HEADING])))
+    variance = step_variance(
+        step,
+        track.following.geometry,
+        gnss_bias_sigma_m=track.noise.bias_sigma_m,
+        bias_time_s=track.noise.bias_time_s,
+    )
+    return Seeker(
+        Pose2(float(after[X]), float(after[Y]), float(after[HEADING])),
+        track.seeker.pairs,
+        track.seeker.drift_rad2 + float(variance[HEADING]),
+    )
 
 
 def _calibrated_for(track: Track, source: TurnSource) -> Track:
