@@ -144,18 +144,26 @@ def unpacked(chunk: Chunk, *, checksum_required: bool) -> bytes:
 def messages(data: bytes) -> Iterator[ChunkMessage]:
     """The messages among a chunk's records, in order. Raises LogDamaged if the records do not fill it exactly."""
     offset, end = 0, len(data)
-    unpack, fixed, frame = MESSAGE.unpack_from, MESSAGE.size, FRAME.size
+    unpack, fixed, is_message = MESSAGE.unpack_from, MESSAGE.size, int(Opcode.MESSAGE)
     while offset < end:
-        opcode, length = FRAME.unpack_from(data, offset) if end - offset >= frame else (0, end)
-        following = offset + frame + length
-        if following > end:
-            raise LogDamaged(f"record of {length} bytes at {offset} reaches past the chunk's end at {end}")
-        if opcode == Opcode.MESSAGE:
-            if length < MESSAGE_FIXED_BYTES:
-                raise LogDamaged(f"message of {length} bytes at {offset}, at least {MESSAGE_FIXED_BYTES} expected")
-            _, _, channel_id, sequence, log_time_ns, _ = unpack(data, offset)
-            yield ChunkMessage(channel_id, sequence, log_time_ns, data[offset + fixed : following], offset)
+        if end - offset < fixed or data[offset] != is_message:
+            offset = _end_of_definition(data, offset)
+            continue
+        _, length, channel_id, sequence, log_time_ns, _ = unpack(data, offset)
+        following = offset + FRAME.size + length
+        if length < MESSAGE_FIXED_BYTES or following > end:
+            raise LogDamaged(f"message of {length} bytes at {offset} does not fit into the chunk's {end}")
+        yield ChunkMessage(channel_id, sequence, log_time_ns, data[offset + fixed : following], offset)
         offset = following
+
+
+def _end_of_definition(data: bytes, offset: int) -> int:
+    """Where the record that is no message ends. Raises LogDamaged if that is past the chunk's end."""
+    length = FRAME.unpack_from(data, offset)[1] if len(data) - offset >= FRAME.size else len(data)
+    following: int = offset + FRAME.size + length
+    if following > len(data) or data[offset] == Opcode.MESSAGE:
+        raise LogDamaged(f"record of {length} bytes at {offset} does not fit into the chunk's {len(data)}")
+    return following
 
 
 def definitions(data: bytes) -> tuple[tuple[Schema, ...], tuple[Channel, ...]]:
