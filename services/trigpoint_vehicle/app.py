@@ -108,4 +108,6 @@ def convert_table(manifest_path: Path, out_dir: Path, *, data_dir: Path | None =
 
 def record_campus(settings: SimulationSettings, out_dir: Path) -> Written:
     """The simulated campus of a seed as logs, truth and anchors. Raises InputError."""
-    return write_conversion(conversion_of(simulate_campus(settings.seed, settings.campus())), out_dir)
+    with tqdm(total=settings.vehicles, desc="driving", unit="vehicle", disable=None) as bar:
+        campus = simulate_campus(settings.seed, settings.campus(), progress=lambda done, total: bar.update())
+    return write_conversion(conversion_of(campus), out_dir)

@@ -25,11 +25,12 @@ logger = logging.getLogger(__name__)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplaySettings:
     """At most `window` messages are under way; all of them are sent again after `ack_timeout_s` without progress,
-    `attempts` times. Ingest has to appear within `listener_timeout_s`.
+    `attempts` times. They are sent `together` at a time. Ingest has to appear within `listener_timeout_s`.
     """
 
     root: str = DEFAULT_ROOT
     window: int = 4096
+    together: int = 256
     ack_timeout_s: float = 1.0
     attempts: int = 10
     listener_timeout_s: float = 10.0
@@ -52,21 +53,31 @@ class _UnderWay:
         self._acknowledgements = acknowledgements
         self._settings = settings
         self._unacknowledged: deque[BusMessage] = deque()
+        self._gathered: list[BusMessage] = []
         self.sent = 0
         self.resent = 0
 
     def send(self, message: BusMessage) -> None:
         """The message sent, once there is room for it among those under way."""
+        if len(self._unacknowledged) >= self._settings.window:
+            self._send_gathered()
         while len(self._unacknowledged) >= self._settings.window:
             self._await_progress()
         self._unacknowledged.append(message)
-        self._bus.publish(message)
-        self.sent += 1
+        self._gathered.append(message)
+        if len(self._gathered) >= self._settings.together:
+            self._send_gathered()
+
+    def _send_gathered(self) -> None:
+        self._bus.publish_all(self._gathered)
+        self.sent += len(self._gathered)
+        self._gathered.clear()
         while acknowledgement := self._acknowledgements.receive(0.0):
             self._accept(acknowledgement.identity)
 
     def finish(self) -> None:
         """Every message is acknowledged."""
+        self._send_gathered()
         while self._unacknowledged:
             self._await_progress()
 
@@ -98,8 +109,7 @@ class _UnderWay:
 
     def _send_again(self) -> None:
         logger.warning("%d messages sent again from %s", len(self._unacknowledged), self._unacknowledged[0].identity)
-        for message in self._unacknowledged:
-            self._bus.publish(message)
+        self._bus.publish_all(tuple(self._unacknowledged))
         self.resent += len(self._unacknowledged)
 
 

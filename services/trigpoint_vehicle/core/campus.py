@@ -1,5 +1,6 @@
 """A seeded campus: streets, landmarks, drives, aerial images, and the truth of all of it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +24,7 @@ from trigpoint_vehicle.core.sweeps import CLUTTER, Sightings, sightings_along, s
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Progress = Callable[[int, int], None]
 
 PASSED_EVERY = 10  # samples of a motion: under a metre
 
@@ -233,9 +235,14 @@ def _truth(world: _World, driven: list[_Driven], labels: Labels) -> Truth:
     )
 
 
-def simulate_campus(seed: int, settings: CampusSettings) -> Campus:
+def in_silence(done: int, total: int) -> None:
+    """Progress for nobody."""
+
+
+def simulate_campus(seed: int, settings: CampusSettings, *, progress: Progress = in_silence) -> Campus:
     """The campus of a seed: the same seed and settings give the same events and the same truth, bit for bit.
 
+    `progress` gets vehicles driven and vehicles there are, after each.
     Raises InputError for settings that cannot be met.
     """
     origin = GridPosition(settings.origin_easting_m, settings.origin_northing_m)
@@ -246,7 +253,10 @@ def simulate_campus(seed: int, settings: CampusSettings) -> Campus:
     passed_m = np.vstack([motion.pose[::PASSED_EVERY, :2] for motion in motions])
     landmarks = placed_landmarks(streets, passed_m, settings.landmarks, _stream(seed, LANDMARKS))
     world = _World(seed=seed, settings=settings, frame=frame, streets=streets, landmarks=landmarks)
-    driven = [_driven(world, motion, index) for index, motion in enumerate(motions)]
+    driven = []
+    for index, motion in enumerate(motions):
+        driven.append(_driven(world, motion, index))
+        progress(index + 1, len(motions))
     imagery = taken_imagery(settings.imagery, _stream(seed, IMAGES))
     labels = _labels(world, driven, imagery)
     return Campus(

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,83 +17,28 @@ from trigpoint.events.observed import (
     WheelSpeedMeasured,
 )
 from trigpoint.events.truth import Truth, TruthLandmark, TruthPath
-from trigpoint.geodesy.positions import Wgs84Position
-from trigpoint.geodesy.projection import utm_crs
-from trigpoint_vehicle.core.manifest_quantities import Quantity
 from trigpoint_vehicle.core.recording import Conversion, Recording, Timed, boot_id_of, recording_of
-from trigpoint_vehicle.core.source_frames import SourceFrame, grid_headings_rad, wgs84_from_source
-from trigpoint_vehicle.core.source_times import UNIT_NS, leap_correction_ns, unix_ns
+from trigpoint_vehicle.core.source_frames import grid_headings_rad, wgs84_from_source
 from trigpoint_vehicle.core.sweep_events import sweeps_of
 from trigpoint_vehicle.core.table_manifest import (
     Anchors,
-    Clock,
     Detections,
-    FilePart,
     Fixes,
     Heading,
     Inertial,
     Manifest,
-    PositionPart,
-    TimeColumn,
     TrueLandmarks,
     TruePath,
     Vehicle,
     WheelPairs,
     WheelSpeeds,
 )
-from trigpoint_vehicle.core.text_tables import SourceText, TextTable, text_table
+from trigpoint_vehicle.core.table_place import DeclaredPlace, declared_place, expected_map_crs
+from trigpoint_vehicle.core.table_reading import Reading, coordinates, numbers, positions, stamps_ns
+from trigpoint_vehicle.core.text_tables import SourceText, TextTable
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-
-@dataclass(frozen=True, slots=True)
-class _Reading:
-    """A manifest beside the texts of its files."""
-
-    manifest: Manifest
-    file: tuple[str, ...]
-    text: tuple[SourceText, ...]
-
-    def source(self, part: FilePart, vehicle: Vehicle | None = None) -> SourceText:
-        return self.text[self.file.index(part.file or (vehicle.file if vehicle else ""))]
-
-    def table(self, part: FilePart, vehicle: Vehicle | None = None) -> TextTable:
-        source = self.source(part, vehicle)
-        return text_table(source, columns=part.columns, delimiter=part.delimiter, comment=part.comment)
-
-    def clock(self, vehicle: Vehicle) -> Clock:
-        return vehicle.clock or self.manifest.clock
-
-    def frame(self, part: PositionPart) -> SourceFrame:
-        return (part.frame or self.manifest.frame).source_frame()
-
-
-def _stamps_ns(table: TextTable, time: TimeColumn, clock: Clock) -> Ints:
-    epoch_ns = unix_ns(clock.second_zero()) + round(time.offset_s * UNIT_NS["s"])
-    stamps = table.stamps_ns(time.column, unit_ns=UNIT_NS[time.unit], epoch_ns=epoch_ns)
-    if clock.scale == "utc" or len(stamps) == 0:
-        return stamps
-    # a drive is short: the leap seconds of its first instant serve for all of it
-    return stamps + leap_correction_ns(int(stamps.min()), clock.scale)
-
-
-def _numbers(quantity: Quantity | None, table: TextTable) -> Floats:
-    return np.full(len(table.line_number), np.nan) if quantity is None else quantity.of(table)
-
-
-def _coordinates(part: PositionPart, table: TextTable, frame: SourceFrame) -> tuple[Floats, Floats]:
-    # x or longitude first, as the frame wants them
-    given_in_degrees = part.lat is not None
-    if given_in_degrees != frame.in_degrees:
-        wanted = "lat and lon" if frame.in_degrees else "east and north"
-        raise InputError(f"{table.source}: its frame {frame.crs!r} needs {wanted}")
-    x, y = (part.lon, part.lat) if given_in_degrees else (part.east, part.north)
-    return _numbers(x, table), _numbers(y, table)
-
-
-def _positions(part: PositionPart, table: TextTable, frame: SourceFrame) -> tuple[Floats, Floats]:
-    return wgs84_from_source(*_coordinates(part, table, frame), frame)
 
 
 def _kept(stamps: Ints, *columns: Floats, needed: int) -> list[tuple[int, ...]]:
@@ -103,39 +47,39 @@ def _kept(stamps: Ints, *columns: Floats, needed: int) -> list[tuple[int, ...]]:
     return list(zip(stamps[known].tolist(), *(column[known].tolist() for column in columns), strict=True))
 
 
-def _fixes(reading: _Reading, vehicle: Vehicle, part: Fixes) -> list[Timed]:
+def _fixes(reading: Reading, vehicle: Vehicle, part: Fixes) -> list[Timed]:
     table = reading.table(part, vehicle)
-    lat, lon = _positions(part, table, reading.frame(part))
+    lat, lon = positions(part, table, reading.frame(part))
     rows = _kept(
-        _stamps_ns(table, part.time, reading.clock(vehicle)),
+        stamps_ns(table, part.time, reading.clock(vehicle)),
         lat,
         lon,
-        _numbers(part.height, table),
-        _numbers(part.sigma, table),
+        numbers(part.height, table),
+        numbers(part.sigma, table),
         needed=2,
     )
     return [(t, GnssFixReceived(lat_deg=lat, lon_deg=lon, height_m=h, sigma_m=s)) for t, lat, lon, h, s in rows]
 
 
-def _wheel_speeds(reading: _Reading, vehicle: Vehicle, part: WheelSpeeds) -> list[Timed]:
+def _wheel_speeds(reading: Reading, vehicle: Vehicle, part: WheelSpeeds) -> list[Timed]:
     table = reading.table(part, vehicle)
-    stamps = _stamps_ns(table, part.time, reading.clock(vehicle))
-    turning = (_numbers(part.steering, table), _numbers(part.yaw_rate, table))
+    stamps = stamps_ns(table, part.time, reading.clock(vehicle))
+    turning = (numbers(part.steering, table), numbers(part.yaw_rate, table))
     rows = _kept(stamps, part.speed.of(table), *turning, needed=1)
     return [(t, WheelSpeedMeasured(speed_mps=v, steering_rad=s, yaw_rate_radps=w)) for t, v, s, w in rows]
 
 
-def _wheel_pairs(reading: _Reading, vehicle: Vehicle, part: WheelPairs) -> list[Timed]:
+def _wheel_pairs(reading: Reading, vehicle: Vehicle, part: WheelPairs) -> list[Timed]:
     table = reading.table(part, vehicle)
-    stamps = _stamps_ns(table, part.time, reading.clock(vehicle))
+    stamps = stamps_ns(table, part.time, reading.clock(vehicle))
     rows = _kept(stamps, part.left.of(table), part.right.of(table), needed=2)
     return [(t, WheelPairMeasured(left_mps=left, right_mps=right)) for t, left, right in rows]
 
 
-def _inertial(reading: _Reading, vehicle: Vehicle, part: Inertial) -> list[Timed]:
+def _inertial(reading: Reading, vehicle: Vehicle, part: Inertial) -> list[Timed]:
     table = reading.table(part, vehicle)
-    stamps = _stamps_ns(table, part.time, reading.clock(vehicle))
-    pulls = (_numbers(part.acceleration_x, table), _numbers(part.acceleration_y, table))
+    stamps = stamps_ns(table, part.time, reading.clock(vehicle))
+    pulls = (numbers(part.acceleration_x, table), numbers(part.acceleration_y, table))
     rows = _kept(stamps, part.yaw_rate.of(table), *pulls, needed=1)
     return [(t, ImuMeasured(yaw_rate_radps=w, acceleration_x_mps2=x, acceleration_y_mps2=y)) for t, w, x, y in rows]
 
@@ -144,12 +88,12 @@ def _polar(vehicle: Vehicle, part: Detections, table: TextTable) -> tuple[Floats
     if part.range is not None and part.bearing is not None:
         return part.range.of(table), part.bearing.of(table)
     sensor = vehicle.geometry
-    ahead = _numbers(part.x, table) - sensor.landmark_sensor_x_m
-    left = _numbers(part.y, table) - sensor.landmark_sensor_y_m
+    ahead = numbers(part.x, table) - sensor.landmark_sensor_x_m
+    left = numbers(part.y, table) - sensor.landmark_sensor_y_m
     return np.hypot(ahead, left), np.arctan2(left, ahead) - sensor.landmark_sensor_yaw_rad
 
 
-def _sweeps(reading: _Reading, vehicle: Vehicle, part: Detections) -> list[Timed]:
+def _sweeps(reading: Reading, vehicle: Vehicle, part: Detections) -> list[Timed]:
     table = reading.table(part, vehicle)
     range_m, bearing_rad = _polar(vehicle, part, table)
     bearing_rad = (bearing_rad + math.pi) % (2.0 * math.pi) - math.pi
@@ -158,26 +102,25 @@ def _sweeps(reading: _Reading, vehicle: Vehicle, part: Detections) -> list[Timed
         bearing_rad.tolist(),
         part.kind.of(table),
         part.signature.of(table),
-        _numbers(part.diameter, table).tolist(),
+        numbers(part.diameter, table).tolist(),
         strict=True,
     )
     detections = [LandmarkDetection(*row) if math.isfinite(row[0] + row[1]) else None for row in columns]
-    return sweeps_of(_stamps_ns(table, part.time, reading.clock(vehicle)).tolist(), detections)
+    return sweeps_of(stamps_ns(table, part.time, reading.clock(vehicle)).tolist(), detections)
 
 
-def _described(manifest: Manifest, vehicle: Vehicle) -> VehicleDescribed:
-    origin = manifest.frame.on_grid if manifest.frame.kind == "local" else None
+def _described(vehicle: Vehicle, place: DeclaredPlace | None) -> VehicleDescribed:
     return VehicleDescribed(
         vehicle=vehicle.name,
-        declared_crs=manifest.frame.crs if origin else manifest.map_crs,
-        declared_origin_easting_m=origin.easting_m if origin else 0.0,
-        declared_origin_northing_m=origin.northing_m if origin else 0.0,
+        declared_crs=place.crs if place else "",
+        declared_origin_easting_m=place.origin.easting_m if place else 0.0,
+        declared_origin_northing_m=place.origin.northing_m if place else 0.0,
         software="trigpoint convert table",
         **vehicle.geometry.model_dump(),
     )
 
 
-def _recording(reading: _Reading, vehicle: Vehicle, manifest_text: str) -> Recording:
+def _recording(reading: Reading, vehicle: Vehicle, place: DeclaredPlace | None, manifest_text: str) -> Recording:
     timed: list[Timed] = []
     for fixes in vehicle.fixes:
         timed += _fixes(reading, vehicle, fixes)
@@ -191,7 +134,7 @@ def _recording(reading: _Reading, vehicle: Vehicle, manifest_text: str) -> Recor
         timed += _sweeps(reading, vehicle, detections)
     used = dict.fromkeys(reading.source(part, vehicle).text for part in vehicle.parts())
     boot_id = boot_id_of(vehicle.name.encode(), manifest_text.encode(), *(text.encode() for text in used))
-    return recording_of(_described(reading.manifest, vehicle), timed, boot_id=boot_id)
+    return recording_of(_described(vehicle, place), timed, boot_id=boot_id)
 
 
 def _east_based_rad(heading: Heading, table: TextTable) -> Floats:
@@ -201,14 +144,14 @@ def _east_based_rad(heading: Heading, table: TextTable) -> Floats:
     return turned + (0.5 * math.pi if heading.zero == "north" else 0.0)
 
 
-def _true_path(reading: _Reading, vehicle: Vehicle, part: TruePath, map_crs: str) -> TruthPath:
+def _true_path(reading: Reading, vehicle: Vehicle, part: TruePath, map_crs: str) -> TruthPath:
     table, frame = reading.table(part, vehicle), reading.frame(part)
-    x, y = _coordinates(part, table, frame)
+    x, y = coordinates(part, table, frame)
     lat_deg, lon_deg = wgs84_from_source(x, y, frame)
     heading_rad = np.full(len(x), np.nan)
     if part.heading is not None:
         heading_rad = grid_headings_rad(x, y, _east_based_rad(part.heading, table), frame, map_crs=map_crs)
-    stamp_ns = _stamps_ns(table, part.time, reading.clock(vehicle))
+    stamp_ns = stamps_ns(table, part.time, reading.clock(vehicle))
     order = np.argsort(stamp_ns, kind="stable")
     order = order[np.isfinite(lat_deg[order])]
     return TruthPath(
@@ -220,26 +163,9 @@ def _true_path(reading: _Reading, vehicle: Vehicle, part: TruePath, map_crs: str
     )
 
 
-def _map_crs(reading: _Reading, recordings: Sequence[Recording]) -> str:
-    # the zone of the first fix, as a map without a declared CRS pins it
-    if reading.manifest.map_crs or reading.manifest.frame.on_grid:
-        return reading.manifest.map_crs or reading.manifest.frame.crs
-    for recording in recordings:
-        for row in recording.rows:
-            if isinstance(row.event, GnssFixReceived):
-                return utm_crs(Wgs84Position(row.event.lat_deg, row.event.lon_deg))
-    for vehicle in reading.manifest.vehicle:
-        for part in vehicle.true_path:
-            lat, lon = _positions(part, reading.table(part, vehicle), reading.frame(part))
-            known = np.flatnonzero(np.isfinite(lat))
-            if len(known):
-                return utm_crs(Wgs84Position(float(lat[known[0]]), float(lon[known[0]])))
-    return ""
-
-
-def _true_landmarks(reading: _Reading, part: TrueLandmarks) -> list[TruthLandmark]:
+def _true_landmarks(reading: Reading, part: TrueLandmarks) -> list[TruthLandmark]:
     table = reading.table(part)
-    lat, lon = _positions(part, table, reading.frame(part))
+    lat, lon = positions(part, table, reading.frame(part))
     columns = zip(part.name.of(table), lat.tolist(), lon.tolist(), part.signature.of(table), strict=True)
     return [
         TruthLandmark(landmark=name, lat_deg=lat, lon_deg=lon, signature=signature)
@@ -248,9 +174,9 @@ def _true_landmarks(reading: _Reading, part: TrueLandmarks) -> list[TruthLandmar
     ]
 
 
-def _anchors(reading: _Reading, part: Anchors) -> list[AnchorLabelled]:
+def _anchors(reading: Reading, part: Anchors) -> list[AnchorLabelled]:
     table, frame = reading.table(part), reading.frame(part)
-    lat, lon = _positions(part, table, frame)
+    lat, lon = positions(part, table, frame)
     image_sigma_m = part.image_sigma.of(table) if part.image_sigma else np.zeros(len(lat))
     sigma_m = part.sigma.of(table)
     known = np.flatnonzero(np.isfinite(lat)).tolist()
@@ -281,9 +207,10 @@ def converted_tables(manifest: Manifest, manifest_text: str, texts: Sequence[Sou
 
     Raises InputError naming file, row and value; FrameRefused for a CRS that is not known or not usable.
     """
-    reading = _Reading(manifest, manifest.files(), tuple(texts))
-    recordings = tuple(_recording(reading, vehicle, manifest_text) for vehicle in manifest.vehicle)
-    map_crs = _map_crs(reading, recordings)
+    reading = Reading(manifest, manifest.files(), tuple(texts))
+    place = declared_place(reading)
+    recordings = tuple(_recording(reading, vehicle, place, manifest_text) for vehicle in manifest.vehicle)
+    map_crs = expected_map_crs(reading, place)
     return Conversion(
         recordings=recordings,
         truth=Truth(

@@ -96,9 +96,7 @@ def _rows_of(truth: Truth) -> Iterator[_Row]:
         rows = zip(_columns(fixes.stamp_ns, fixes.lat_deg, fixes.lon_deg), fixes.state, strict=True)
         yield from (_Row("fix", fixes.vehicle, int(t), lat, lon, math.nan, state) for (t, lat, lon), state in rows)
     for landmark in truth.landmarks:
-        yield _Row(
-            "landmark", landmark.landmark, 0, landmark.lat_deg, landmark.lon_deg, math.nan, landmark.signature
-        )
+        yield _Row("landmark", landmark.landmark, 0, landmark.lat_deg, landmark.lon_deg, math.nan, landmark.signature)
     for label in truth.labels:
         yield _Row("label", label.anchor, 0, label.lat_deg, label.lon_deg, math.nan, label.landmark)
 
@@ -120,7 +118,9 @@ def _parsed_row(line_number: int, cells: list[str]) -> _Row:
         kind, name, stamp_ns, lat_deg, lon_deg, heading_rad, signature = cells
         row = _Row(kind, name, int(stamp_ns), float(lat_deg), float(lon_deg), float(heading_rad), signature)
     except ValueError as error:
-        raise InputError(f"truth, line {line_number}: {','.join(cells)!r} is not {','.join(COLUMNS)}: {error}") from None
+        raise InputError(
+            f"truth, line {line_number}: {','.join(cells)!r} is not {','.join(COLUMNS)}: {error}"
+        ) from None
     if row.kind not in KINDS:
         raise InputError(f"truth, line {line_number}: kind {row.kind!r} is none of {', '.join(KINDS)}")
     return row

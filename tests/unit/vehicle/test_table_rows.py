@@ -180,3 +180,20 @@ def test_nclt_headings_point_where_the_path_goes(nclt: Conversion) -> None:
     off = np.arctan2(step_m[:, 1], step_m[:, 0]) - path.heading_rad[:-1]
     # a heading left on true north would be off by 1.8 degrees
     assert abs(np.degrees(np.median(np.angle(np.exp(1j * off[moving]))))) < 0.3
+
+
+def test_a_map_crs_is_declared_with_an_origin_near_the_first_fix() -> None:
+    part = 'fixes = { time = "t", lat = "lat", lon = "lon" }'
+    described = drive_of_rows(part, "t,lat,lon\n1,nan,nan\n2,-33.8886,151.1873\n", 'map_crs = "EPSG:7856"').described
+    assert described.declared_crs == "EPSG:7856"
+    assert (described.declared_origin_easting_m, described.declared_origin_northing_m) == (332_000.0, 6_248_000.0)
+
+
+def test_a_map_crs_without_any_position_is_refused() -> None:
+    with pytest.raises(InputError, match="no fix and no anchor says where the map is"):
+        converted('wheel_speeds = { time = "t", speed = "v" }', "t,v\n1,2\n", 'map_crs = "EPSG:7856"')
+
+
+def test_without_a_map_crs_nothing_is_declared() -> None:
+    part = 'fixes = { time = "t", lat = "lat", lon = "lon" }'
+    assert drive_of_rows(part, "t,lat,lon\n1,-33.8886,151.1873\n").described.declared_crs == ""
