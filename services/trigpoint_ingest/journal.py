@@ -91,17 +91,24 @@ class Journal:
                 self._publish(self._bus, pending[stream])
 
     def _publish(self, bus: Bus, rows: Sequence[Envelope[Event]]) -> None:
+        """The rows on their keys; where nobody listens to a key, nothing is sent: the log has it."""
+        key_of_kind: dict[tuple[type, str], str] = {}
+        heard: dict[str, bool] = {}
         for envelope in rows:
-            schema_name, payload = encode(envelope.event)
-            bus.publish(
-                BusMessage(
-                    key=key_of(envelope, root=self._settings.root, map_name=self._settings.map_name),
-                    schema_name=schema_name,
-                    payload=payload,
-                    identity=envelope.identity,
-                    stamp_ns=envelope.stamp_ns,
-                )
-            )
+            kind = (type(envelope.event), envelope.identity.source)
+            key = key_of_kind.get(kind)
+            if key is None:
+                key = key_of_kind[kind] = key_of(envelope, root=self._settings.root, map_name=self._settings.map_name)
+                heard[key] = bus.has_listener(key)
+            if heard[key]:
+                bus.publish(_bus_message(key, envelope))
+
+
+def _bus_message(key: str, envelope: Envelope[Event]) -> BusMessage:
+    name, payload = encode(envelope.event)
+    return BusMessage(
+        key=key, schema_name=name, payload=payload, identity=envelope.identity, stamp_ns=envelope.stamp_ns
+    )
 
 
 def pinned_frame(log: EventLog) -> MapFramePinned | None:

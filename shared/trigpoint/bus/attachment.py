@@ -2,15 +2,22 @@
 
 Layout, little-endian: layout version u8, schema version u8, length of source u16, sequence i64, stamp in ns i64,
 then source and boot id in UTF-8 one behind the other.
+
+A bundle is one transmission of several messages of a key and a schema. Its attachment is layout version 2 and their
+number u32; its payload holds for each of them the lengths of attachment and payload, u32 each, and then these two.
 """
 
 import struct
+from collections.abc import Iterator, Sequence
 
 from trigpoint.errors import InputError
 from trigpoint.events.envelope import EventIdentity
 
 LAYOUT_VERSION = 1
+BUNDLE_VERSION = 2
 _HEAD = struct.Struct("<BBHqq")
+_BUNDLE = struct.Struct("<BI")
+_LENGTHS = struct.Struct("<II")
 
 
 def encode_attachment(identity: EventIdentity, *, stamp_ns: int, schema_version: int) -> bytes:
@@ -36,3 +43,37 @@ def decode_attachment(attachment: bytes) -> tuple[EventIdentity, int, int]:
     except UnicodeDecodeError as error:
         raise InputError(f"attachment names are not UTF-8: {error}") from error
     return EventIdentity(source, boot_id, sequence), stamp_ns, schema_version
+
+
+def encode_bundle(parts: Sequence[tuple[bytes, bytes]]) -> tuple[bytes, bytes]:
+    """Attachment and payload of a bundle of messages, given as attachment and payload each."""
+    packed: list[bytes] = []
+    for attachment, payload in parts:
+        packed += (_LENGTHS.pack(len(attachment), len(payload)), attachment, payload)
+    return _BUNDLE.pack(BUNDLE_VERSION, len(parts)), b"".join(packed)
+
+
+def bundled_count(attachment: bytes) -> int:
+    """How many messages a transmission says it holds: 1 unless it is a bundle."""
+    count: int = _BUNDLE.unpack(attachment)[1] if is_bundle(attachment) else 1
+    return count
+
+
+def is_bundle(attachment: bytes) -> bool:
+    """Whether an attachment is that of a bundle."""
+    return len(attachment) == _BUNDLE.size and attachment[0] == BUNDLE_VERSION
+
+
+def decode_bundle(payload: bytes) -> Iterator[tuple[bytes, bytes]]:
+    """Attachment and payload of each message of a bundle. Raises InputError where the bundle ends inside of one."""
+    offset, end = 0, len(payload)
+    while offset < end:
+        if end - offset < _LENGTHS.size:
+            raise InputError(f"bundle of {end} bytes ends inside the lengths at {offset}")
+        attachment_length, payload_length = _LENGTHS.unpack_from(payload, offset)
+        payload_at = offset + _LENGTHS.size + attachment_length
+        following = payload_at + payload_length
+        if following > end:
+            raise InputError(f"bundle of {end} bytes ends inside the message at {offset}, which reaches to {following}")
+        yield payload[offset + _LENGTHS.size : payload_at], payload[payload_at:following]
+        offset = following

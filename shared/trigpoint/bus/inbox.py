@@ -24,15 +24,15 @@ class Inbox(Generic[ItemT]):
         """How many items were dropped because the inbox was full."""
         return self._lost
 
-    def offer(self, item: ItemT) -> None:
-        """The item queued, or counted as lost if the inbox is full; without effect once closed."""
+    def offer(self, item: ItemT, *, count: int = 1) -> None:
+        """The item queued, or lost if the inbox is full, counted as `count`; without effect once closed."""
         if self._closed.is_set():
             return
         if self._items.qsize() < self._capacity:
             self._items.put(item)
             return
         with self._lock:
-            self._lost += 1
+            self._lost += count
 
     def take(self, timeout_s: float) -> ItemT | None:
         """The oldest item, or None if none came within `timeout_s` or the inbox is closed."""

@@ -1,6 +1,7 @@
 """A bus in memory: sessions of one exchange hear one another, in the same process."""
 
 import threading
+from collections.abc import Sequence
 from types import TracebackType
 from typing import Self
 
@@ -77,6 +78,11 @@ class MemoryBus:
         self._require_open()
         for subscription in self._exchange.listeners(checked_key(message.key)):
             subscription.offer(message)
+
+    def publish_all(self, messages: Sequence[BusMessage]) -> None:
+        """Each message queued with every subscription that matches it."""
+        for message in messages:
+            self.publish(message)
 
     def subscribe(self, key_expression: str) -> MemorySubscription:
         """A subscription to all keys the expression matches."""

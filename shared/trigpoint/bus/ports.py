@@ -1,5 +1,6 @@
 """What a bus can do, whatever carries it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Protocol, Self
@@ -45,6 +46,12 @@ class Bus(Protocol):
         """The message handed to the transport; no promise that anyone got it.
 
         Raises InputError for a key that may not be published, ServiceError on a closed bus.
+        """
+
+    def publish_all(self, messages: Sequence[BusMessage]) -> None:
+        """Each message as by `publish`, in as few transmissions as will do; only messages of one key keep their order.
+
+        For senders whose messages are worth more together than at once. Raises as `publish` does.
         """
 
     def subscribe(self, key_expression: str) -> Subscription:

@@ -3,19 +3,29 @@
 import contextlib
 import json
 import threading
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Self, cast
 
 import zenoh
 
-from trigpoint.bus.attachment import decode_attachment, encode_attachment
+from trigpoint.bus.attachment import (
+    bundled_count,
+    decode_attachment,
+    decode_bundle,
+    encode_attachment,
+    encode_bundle,
+    is_bundle,
+)
 from trigpoint.bus.inbox import INBOX_CAPACITY, Inbox
 from trigpoint.bus.key_expressions import checked_expression, checked_key
 from trigpoint.bus.ports import UNIDENTIFIED, BusMessage
 from trigpoint.errors import InputError, ServiceError
 
 PROTOBUF = "application/protobuf"
+BUNDLE_LIMIT = 256  # messages in a transmission: some 15 kB of IMU, below the 64 kB a Zenoh batch holds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,6 +52,10 @@ def _config(settings: ZenohSettings) -> zenoh.Config:
     return config
 
 
+def _attachment(message: BusMessage) -> bytes:
+    return encode_attachment(message.identity, stamp_ns=message.stamp_ns, schema_version=message.schema_version)
+
+
 @dataclass(frozen=True, slots=True)
 class _Arrival:
     """A sample's content, copied out of the transport's buffers."""
@@ -52,16 +66,25 @@ class _Arrival:
     attachment: bytes
 
 
-def _message(arrival: _Arrival) -> BusMessage:
-    schema_name = arrival.encoding.partition(";")[2]
+def _messages(arrival: _Arrival) -> list[BusMessage]:
+    """What arrived in one transmission; as one UNIDENTIFIED message whatever is not ours."""
+    if not is_bundle(arrival.attachment):
+        return [_message(arrival, arrival.attachment, arrival.payload)]
     try:
-        identity, stamp_ns, schema_version = decode_attachment(arrival.attachment)
+        return [_message(arrival, attachment, payload) for attachment, payload in decode_bundle(arrival.payload)]
+    except InputError:
+        return [_message(arrival, b"", arrival.payload)]
+
+
+def _message(arrival: _Arrival, attachment: bytes, payload: bytes) -> BusMessage:
+    try:
+        identity, stamp_ns, schema_version = decode_attachment(attachment)
     except InputError:  # a foreign sender: delivered as UNIDENTIFIED, so that the receiver can refuse and keep it
         identity, stamp_ns, schema_version = UNIDENTIFIED, 0, 0
     return BusMessage(
         key=arrival.key,
-        schema_name=schema_name,
-        payload=arrival.payload,
+        schema_name=arrival.encoding.partition(";")[2],
+        payload=payload,
         identity=identity,
         stamp_ns=stamp_ns,
         schema_version=schema_version,
@@ -73,18 +96,14 @@ class ZenohSubscription:
 
     def __init__(self, session: zenoh.Session, key_expression: str, capacity: int) -> None:
         self._inbox: Inbox[_Arrival] = Inbox(capacity)
+        self._unpacked: deque[BusMessage] = deque()
         self._subscriber = session.declare_subscriber(key_expression, self._arrived)
 
     def _arrived(self, sample: zenoh.Sample) -> None:
-        attachment = sample.attachment
-        self._inbox.offer(
-            _Arrival(
-                str(sample.key_expr),
-                str(sample.encoding),
-                sample.payload.to_bytes(),
-                attachment.to_bytes() if attachment is not None else b"",
-            )
-        )
+        attached = sample.attachment
+        attachment = attached.to_bytes() if attached is not None else b""
+        arrival = _Arrival(str(sample.key_expr), str(sample.encoding), sample.payload.to_bytes(), attachment)
+        self._inbox.offer(arrival, count=bundled_count(attachment))
 
     @property
     def lost(self) -> int:
@@ -93,12 +112,17 @@ class ZenohSubscription:
 
     def receive(self, timeout_s: float) -> BusMessage | None:
         """The next message, or None if none came within `timeout_s` or the subscription is closed."""
-        arrival = self._inbox.take(timeout_s)
-        return None if arrival is None else _message(arrival)
+        if not self._unpacked:
+            arrival = self._inbox.take(timeout_s)
+            if arrival is None:
+                return None
+            self._unpacked.extend(_messages(arrival))
+        return self._unpacked.popleft()
 
     def close(self) -> None:
         """No more messages; ones not yet received are dropped."""
         self._inbox.close()
+        self._unpacked.clear()
         with contextlib.suppress(zenoh.ZError):  # already undeclared, or its session is gone
             self._subscriber.undeclare()  # type: ignore[no-untyped-call]
 
@@ -118,12 +142,25 @@ class ZenohBus:
 
     def publish(self, message: BusMessage) -> None:
         """The message handed to Zenoh; no promise that anyone got it."""
-        attachment = encode_attachment(
-            message.identity, stamp_ns=message.stamp_ns, schema_version=message.schema_version
-        )
+        self._put(message, message.payload, _attachment(message))
+
+    def publish_all(self, messages: Sequence[BusMessage]) -> None:
+        """The messages handed to Zenoh, those of one key and schema in bundles; only they keep their order."""
+        groups: dict[tuple[str, str], list[BusMessage]] = {}
+        for message in messages:
+            groups.setdefault((message.key, message.schema_name), []).append(message)
+        for group in groups.values():
+            for first in range(0, len(group), BUNDLE_LIMIT):
+                self._put_bundle(group[first : first + BUNDLE_LIMIT])
+
+    def _put_bundle(self, messages: Sequence[BusMessage]) -> None:
+        attachment, payload = encode_bundle([(_attachment(message), message.payload) for message in messages])
+        self._put(messages[0], payload, attachment)
+
+    def _put(self, message: BusMessage, payload: bytes, attachment: bytes) -> None:
         publisher = self._publisher(message.key, message.schema_name)
         try:
-            publisher.put(message.payload, attachment=attachment)
+            publisher.put(payload, attachment=attachment)
         except zenoh.ZError as error:
             raise ServiceError(f"nothing could be published on {message.key}: {error}") from error
 

@@ -3,7 +3,7 @@
 import random
 import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -52,6 +52,10 @@ class LossyBus:
             for delayed in self._delayed:
                 self._bus.publish(delayed)
             self._delayed.clear()
+
+    def publish_all(self, messages: Sequence[BusMessage]) -> None:
+        for message in messages:
+            self.publish(message)
 
     def subscribe(self, key_expression: str) -> Subscription:
         return self._bus.subscribe(key_expression)

@@ -4,7 +4,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from trigpoint.bus.attachment import decode_attachment, encode_attachment
+from trigpoint.bus.attachment import (
+    bundled_count,
+    decode_attachment,
+    decode_bundle,
+    encode_attachment,
+    encode_bundle,
+)
 from trigpoint.errors import InputError
 from trigpoint.events.envelope import EventIdentity
 
@@ -45,3 +51,21 @@ def test_an_attachment_of_another_layout_is_refused() -> None:
 def test_a_sequence_beyond_64_bits_is_refused() -> None:
     with pytest.raises(InputError, match="sequence"):
         encode_attachment(EventIdentity("vehicle", "boot", 2**63), stamp_ns=1, schema_version=1)
+
+
+@given(parts=st.lists(st.tuples(st.binary(max_size=30), st.binary(max_size=30))))
+def test_what_was_bundled_comes_out_again_and_its_number_is_known(parts: list[tuple[bytes, bytes]]) -> None:
+    attachment, payload = encode_bundle(parts)
+    assert list(decode_bundle(payload)) == parts
+    assert bundled_count(attachment) == len(parts)
+
+
+def test_a_single_message_counts_as_one() -> None:
+    assert bundled_count(encode_attachment(EventIdentity("v", "b", 1), stamp_ns=1, schema_version=1)) == 1
+
+
+@pytest.mark.parametrize("cut", [1, 5, 12])
+def test_a_truncated_bundle_is_refused(cut: int) -> None:
+    _, payload = encode_bundle([(b"abc", b"defg"), (b"h", b"i")])
+    with pytest.raises(InputError, match="ends inside"):
+        list(decode_bundle(payload[:-cut]))
