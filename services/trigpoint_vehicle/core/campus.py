@@ -24,7 +24,7 @@ from trigpoint_vehicle.core.sweeps import CLUTTER, Sightings, sightings_along, s
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Progress = Callable[[int, int], None]
+Progress = Callable[[int, int], object]
 
 PASSED_EVERY = 10  # samples of a motion: under a metre
 
