@@ -132,7 +132,7 @@ def _smoothed_angles(phasor: NDArray[np.complex128], at_m: Floats, path_m: Float
     return np.interp(path_m, path_m[known], np.unwrap(np.angle(mean[known])))
 
 
-def _turned_path(pose: Floats, correction_rad: Floats) -> Floats:
+def turned_path(pose: Floats, correction_rad: Floats) -> Floats:
     """Poses (n, 3) whose steps are turned by the correction (n,)."""
     step = np.diff(pose[:, :2], axis=0)
     middle = 0.5 * (correction_rad[1:] + correction_rad[:-1])
@@ -191,7 +191,7 @@ def bent_alignment(path_pose: Floats, antenna_base_m: Floats, fix_m: Floats, *, 
         raise AlignmentRefused(f"{len(fix_m)} fixes match the path: at least {MIN_FIXES} are needed")
     antenna = transform_points(path_pose, antenna_base_m)
     turn = _heading_corrections(antenna, fix_m, path_m, sigma_m)
-    pose = _turned_path(path_pose, turn)
+    pose = turned_path(path_pose, turn)
     correction = fix_m - transform_points(pose, antenna_base_m)
     consistent = consistent_fixes(correction, path_m)
     weight = consistent / sigma_m**2

@@ -21,30 +21,36 @@ ErrorFunction = Callable[[gtsam.CustomFactor, gtsam.Values, Jacobians], Floats]
 def odometry_factor(
     keys: tuple[int, int, int, int], delta: Floats, derivative: Floats, *, reference: Floats, covariance: Floats
 ) -> gtsam.CustomFactor:
-    """Motion from keyframe keys[0] to keys[1] as the wheels tell it under scales keys[2] (2,) and turn bias keys[3] (1,).
+    """Motion from keyframe keys[0] to keys[1] as the wheels tell it under keys[2] (3,): speed scale, turn scale,
+    delay, and turn bias keys[3] (1,).
 
-    delta (3,) was integrated at the calibration `reference` (3,): speed scale, turn scale, turn bias; derivative
-    (3, 3) is its derivative there (Forster et al. 2017, first-order bias correction, in SE(2)).
+    delta (3,) was integrated at the calibration `reference` (4,); derivative (3, 4) is its derivative there
+    (Forster et al. 2017, first-order bias correction, in SE(2)). The residual is divided by the scales: taken in
+    map units, many noisy odometry residuals would shrink the map through the scale states.
     """
     key_from, key_to, key_scale, key_bias = keys
-    by_scale, by_bias = -derivative[:, :2], -derivative[:, 2:]
+    by_scale, by_bias = -derivative[:, :3], -derivative[:, 3:]
 
     def error(_: gtsam.CustomFactor, values: gtsam.Values, jacobians: Jacobians) -> Floats:
         start, end = values.atPose2(key_from), values.atPose2(key_to)
         scale, bias = values.atVector(key_scale), values.atVector(key_bias)
-        change = (scale[0] - reference[0], scale[1] - reference[1], bias[0] - reference[2])
-        expected = delta + derivative @ change
+        expected = delta + derivative @ np.array([*scale, *bias]) - derivative @ reference
         c, s = math.cos(start.theta()), math.sin(start.theta())
         east, north = end.x() - start.x(), end.y() - start.y()
         ahead, left = c * east + s * north, c * north - s * east
         turned = end.theta() - start.theta()
+        unit = np.array([1.0 / scale[0], 1.0 / scale[0], 1.0 / scale[1]])
+        residual = unit * (ahead - expected[0], left - expected[1], wrap_angle_rad(turned - expected[2]))
         if jacobians is not None:
             ct, st = math.cos(turned), math.sin(turned)
-            jacobians[0] = np.array([[-1.0, 0.0, left], [0.0, -1.0, -ahead], [0.0, 0.0, -1.0]])
-            jacobians[1] = np.array([[ct, -st, 0.0], [st, ct, 0.0], [0.0, 0.0, 1.0]])
-            jacobians[2] = by_scale
-            jacobians[3] = by_bias
-        return np.array([ahead - expected[0], left - expected[1], wrap_angle_rad(turned - expected[2])])
+            row = unit[:, None]
+            jacobians[0] = row * np.array([[-1.0, 0.0, left], [0.0, -1.0, -ahead], [0.0, 0.0, -1.0]])
+            jacobians[1] = row * np.array([[ct, -st, 0.0], [st, ct, 0.0], [0.0, 0.0, 1.0]])
+            jacobians[2] = row * by_scale
+            jacobians[2][:2, 0] -= residual[:2] * unit[0]
+            jacobians[2][2, 1] -= residual[2] * unit[2]
+            jacobians[3] = row * by_bias
+        return residual
 
     return gtsam.CustomFactor(gtsam.noiseModel.Gaussian.Covariance(covariance), list(keys), error)
 
@@ -80,17 +86,17 @@ def fix_factor(
     return gtsam.CustomFactor(noise, list(keys), error)
 
 
-def decay_factor(key_from: int, key_to: int, *, decay: float, sigma_m: float) -> gtsam.CustomFactor:
-    """A Gauss-Markov step: the state (2,) at keys_to is `decay` times that at key_from, plus noise sigma_m."""
+def decay_factor(key_from: int, key_to: int, *, decay: float, sigma_m: float, size: int) -> gtsam.CustomFactor:
+    """A Gauss-Markov step: the state (size,) at key_to is `decay` times that at key_from, plus noise sigma_m."""
 
     def error(_: gtsam.CustomFactor, values: gtsam.Values, jacobians: Jacobians) -> Floats:
         if jacobians is not None:
-            jacobians[0] = -decay * np.eye(2)
-            jacobians[1] = np.eye(2)
+            jacobians[0] = -decay * np.eye(size)
+            jacobians[1] = np.eye(size)
         step: Floats = values.atVector(key_to) - decay * values.atVector(key_from)
         return step
 
-    return gtsam.CustomFactor(gtsam.noiseModel.Isotropic.Sigma(2, sigma_m), [key_from, key_to], error)
+    return gtsam.CustomFactor(gtsam.noiseModel.Isotropic.Sigma(size, sigma_m), [key_from, key_to], error)
 
 
 def anchor_factor(keys: tuple[int, ...], label_m: Floats, *, noise: gtsam.noiseModel.Base) -> gtsam.CustomFactor:

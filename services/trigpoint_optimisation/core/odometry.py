@@ -13,7 +13,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 SCALE_STEP = 1e-4  # dimensionless, step of the numeric derivative by speed and turn scale
-BIAS_STEP = 1e-5  # rad (steering) or rad/s (yaw rate), step of the numeric derivative by turn bias
+DELAY_STEP_S = 0.01  # s, step of the central difference by the clock delay
+BIAS_STEP = 1e-5  # rad, rad/s or rad/m, step of the numeric derivative by turn bias
 MAX_STEERING_RAD = 1.2  # tan() stays bounded for any steering input
 
 
@@ -29,13 +30,16 @@ class TurnSource(Enum):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometryCalibration:
     """Calibration of one drive's odometry: true speed = `speed_scale` x measured; true turn = `turn_scale` x
-    measured + bias, where turn is steering angle (rad) or yaw rate (rad/s) by TurnSource.
+    measured + bias, where turn is steering angle (rad) or yaw rate by TurnSource; the bias of an IMU is in rad/s, of
+    wheels in rad/m (unequal wheel radii turn per metre, not per second).
 
+    The wheels' clock reads `delay_s` more than the other sensors' at the same instant.
     `turn_bias` (m,) at `bias_stamp_ns` (m,), held between them.
     """
 
     speed_scale: float
     turn_scale: float
+    delay_s: float
     bias_stamp_ns: Ints
     turn_bias: Floats
 
@@ -43,12 +47,16 @@ class OdometryCalibration:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeadReckonedPath:
     """A path in a frame of its own. stamp_ns (n,); pose (n, 3): x, y in m, heading in rad, not wrapped;
-    distance_m and turned_rad (n,): path length and sum of absolute heading changes since the start."""
+    distance_m and turned_rad (n,): path length and sum of absolute heading changes since the start;
+    sampling_m2 and sampling_rad2 (n,): variance of along-path position and heading since the start that
+    comes from how coarsely speed and yaw rate were sampled."""
 
     stamp_ns: Ints
     pose: Floats
     distance_m: Floats
     turned_rad: Floats
+    sampling_m2: Floats
+    sampling_rad2: Floats
 
     def at(self, stamp_ns: Ints) -> Floats:
         """Poses (m, 3) at any stamps (m,), interpolated, held at the ends."""
@@ -60,7 +68,7 @@ class DeadReckonedPath:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motions:
     """Motions between a drive's keyframes. stamp_ns (n,); delta (n-1, 3): x, y in m, heading in rad of the
-    later keyframe in the earlier one's frame; derivative (n-1, 3, 3) by speed scale, turn scale, turn bias;
+    later keyframe in the earlier one's frame; derivative (n-1, 3, 4) by speed scale, turn scale, delay, turn bias;
     covariance (n-1, 3, 3); bias_index (n-1,) which turn bias acts."""
 
     stamp_ns: Ints
@@ -96,24 +104,29 @@ def _imu_turn_rad(drive: Drive) -> Floats:
     return np.diff(np.interp((drive.wheels.stamp_ns - start_ns) * 1e-9, t_s, heading))
 
 
+def _mean_of_ends(values: Floats) -> Floats:
+    """Trapezoidal mean (n-1,) over each interval of samples (n,)."""
+    return 0.5 * (values[1:] + values[:-1])
+
+
 def _turn_and_speed(drive: Drive, calibration: OdometryCalibration, dt_s: Floats) -> tuple[Floats, Floats]:
     """Heading change in rad and base speed in m/s of each wheel interval (n-1,)."""
     described, wheels = drive.described, drive.wheels
     index = np.searchsorted(calibration.bias_stamp_ns, wheels.stamp_ns[:-1], side="right") - 1
     bias = calibration.turn_bias[np.maximum(index, 0)]
-    speed = calibration.speed_scale * wheels.speed_mps[:-1]
+    speed = calibration.speed_scale * _mean_of_ends(wheels.speed_mps)
     match turn_source(drive):
         case TurnSource.STEERING:
-            angle = calibration.turn_scale * _held(wheels.steering_rad)[:-1] + bias
+            angle = calibration.turn_scale * _mean_of_ends(_held(wheels.steering_rad)) + bias
             curvature = np.tan(np.clip(angle, -MAX_STEERING_RAD, MAX_STEERING_RAD)) / described.wheelbase_m
             base_speed = speed / np.maximum(1.0 - described.speed_wheel_y_m * curvature, 0.1)
             return base_speed * curvature * dt_s, base_speed
         case TurnSource.IMU:
             turn = calibration.turn_scale * _imu_turn_rad(drive) + bias * dt_s
         case TurnSource.WHEELS:
-            turn = (calibration.turn_scale * _held(wheels.yaw_rate_radps)[:-1] + bias) * dt_s
+            turn = (calibration.turn_scale * _mean_of_ends(_held(wheels.yaw_rate_radps)) + bias * speed) * dt_s
         case TurnSource.NONE:
-            turn = bias * dt_s
+            turn = bias * speed * dt_s
     yaw_rate = np.divide(turn, dt_s, out=np.zeros_like(turn), where=dt_s > 0.0)
     return turn, speed + described.speed_wheel_y_m * yaw_rate
 
@@ -132,11 +145,22 @@ def dead_reckon(drive: Drive, calibration: OdometryCalibration, *, max_gap_s: fl
     x = np.concatenate([[0.0], np.cumsum(step_m * np.cos(middle))])
     y = np.concatenate([[0.0], np.cumsum(step_m * np.sin(middle))])
     return DeadReckonedPath(
-        stamp_ns=stamp_ns,
+        stamp_ns=stamp_ns - round(calibration.delay_s * 1e9),
         pose=np.column_stack([x, y, heading]),
         distance_m=np.concatenate([[0.0], np.cumsum(np.abs(step_m))]),
         turned_rad=np.concatenate([[0.0], np.cumsum(np.abs(turn_rad))]),
+        sampling_m2=_sampling_variance(step_m, dt_s),
+        sampling_rad2=_sampling_variance(turn_rad, dt_s),
     )
+
+
+def _sampling_variance(step: Floats, dt_s: Floats) -> Floats:
+    """Variance (n,) accumulated since the start by integrating a sampled rate: a rate that changes by d between
+    neighbouring samples leaves its integral over dt uncertain by about d dt / sqrt(12) (uniform in between)."""
+    rate = np.divide(step, dt_s, out=np.zeros_like(step), where=dt_s > 0.0)
+    change = np.abs(np.diff(rate, prepend=rate[:1]))
+    change = np.maximum(change, np.append(change[1:], 0.0)) if len(change) else change
+    return np.concatenate([[0.0], np.cumsum((change * dt_s) ** 2 / 12.0)])
 
 
 def keyframe_stamps(path: DeadReckonedPath, *, distance_m: float, turn_rad: float) -> Ints:
@@ -184,8 +208,10 @@ def _covariances(path: DeadReckonedPath, stamp_ns: Ints, noise: OdometryNoise) -
     turned = np.diff(np.interp(at_s, t_s, path.turned_rad))
     heading = noise.heading_rad**2 * metres + noise.heading_rad_per_sqrt_s**2 * np.diff(at_s)
     heading += (noise.turn_fraction * turned) ** 2 + noise.floor_rad**2
+    heading += np.diff(np.interp(at_s, t_s, path.sampling_rad2))
+    along = noise.along_m**2 * metres + noise.floor_m**2 + np.diff(np.interp(at_s, t_s, path.sampling_m2))
     covariance = np.zeros((len(metres), 3, 3))
-    covariance[:, 0, 0] = noise.along_m**2 * metres + noise.floor_m**2
+    covariance[:, 0, 0] = along
     covariance[:, 1, 1] = noise.across_m**2 * metres + noise.floor_m**2 + heading * metres**2 / 3.0
     covariance[:, 2, 2] = heading
     covariance[:, 1, 2] = covariance[:, 2, 1] = heading * metres / 2.0
@@ -202,6 +228,7 @@ def keyframe_motions(
     stepped = (
         (replace(calibration, speed_scale=calibration.speed_scale + SCALE_STEP), SCALE_STEP),
         (replace(calibration, turn_scale=calibration.turn_scale + SCALE_STEP), SCALE_STEP),
+        (replace(calibration, delay_s=calibration.delay_s + DELAY_STEP_S), DELAY_STEP_S),
         (replace(calibration, turn_bias=calibration.turn_bias + BIAS_STEP), BIAS_STEP),
     )
     columns = []

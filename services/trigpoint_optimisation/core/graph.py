@@ -1,0 +1,188 @@
+"""The factor graph of a fleet: odometry, calibrations, fixes, landmarks and anchors, each pulling what it claims."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import gtsam
+import numpy as np
+from numpy.typing import NDArray
+
+from trigpoint_optimisation.core.factors import anchor_factor, decay_factor, fix_factor, odometry_factor
+from trigpoint_optimisation.core.odometry import OdometryCalibration, TurnSource
+from trigpoint_optimisation.core.preparation import PreparedDrive
+from trigpoint_optimisation.core.sightings import Sightings
+from trigpoint_optimisation.core.state import (
+    antenna_key,
+    fix_bias_key,
+    image_key,
+    landmark_key,
+    pose_key,
+    scale_key,
+    sensor_key,
+    turn_bias_key,
+)
+from trigpoint_optimisation.settings import CalibrationPriors, FixSettings
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+MIN_RANGE_M = 0.2  # a sighting closer than this to the base's origin has no usable bearing
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TiedLabels:
+    """Labels (l,) tied to landmarks: landmark (l,), label_m (l, 2), sigma_m (l,), image (l,) or -1;
+    image_sigma_m (k,) prior of each image's offset."""
+
+    landmark: Ints
+    label_m: Floats
+    sigma_m: Floats
+    image: Ints
+    image_sigma_m: Floats
+
+
+def with_cauchy(noise: gtsam.noiseModel.Base, scale: float | None) -> gtsam.noiseModel.Base:
+    """The noise under a Cauchy kernel of that many sigmas, or as it is."""
+    if scale is None:
+        return noise
+    return gtsam.noiseModel.Robust.Create(gtsam.noiseModel.mEstimator.Cauchy.Create(scale), noise)
+
+
+def _calibration_vector(calibration: OdometryCalibration, knot: int) -> Floats:
+    return np.array(
+        [calibration.speed_scale, calibration.turn_scale, calibration.delay_s, calibration.turn_bias[knot]]
+    )
+
+
+def add_motions(graph: gtsam.NonlinearFactorGraph, prepared: PreparedDrive) -> None:
+    """The odometry between neighbouring keyframes."""
+    motions, d = prepared.motions, prepared.index
+    for k in range(len(motions.delta)):
+        knot = int(motions.bias_index[k])
+        graph.add(
+            odometry_factor(
+                (pose_key(d, k), pose_key(d, k + 1), scale_key(d), turn_bias_key(d, knot)),
+                motions.delta[k],
+                motions.derivative[k],
+                reference=_calibration_vector(prepared.calibration, knot),
+                covariance=motions.covariance[k],
+            )
+        )
+
+
+def turn_sigmas(source: TurnSource, priors: CalibrationPriors) -> tuple[float, float]:
+    """1-sigma of turn scale and of turn bias (rad, rad/s or rad/m) by where the yaw rate comes from."""
+    match source:
+        case TurnSource.IMU:
+            return priors.turn_scale_imu, priors.turn_bias_imu_radps
+        case TurnSource.STEERING:
+            return priors.turn_scale_steering, priors.turn_bias_steering_rad
+        case _:
+            return priors.turn_scale_wheels, priors.turn_bias_wheels_radpm
+
+
+def add_calibration_priors(
+    graph: gtsam.NonlinearFactorGraph, prepared: PreparedDrive, priors: CalibrationPriors, *, point_scale: float
+) -> None:
+    """Every calibration state held at its nominal value with its prior sigma; turn bias as a random walk."""
+    d, described = prepared.index, prepared.drive.described
+    turn_scale, turn_bias = turn_sigmas(prepared.source, priors)
+    sigmas = np.array([priors.speed_scale, turn_scale, priors.delay_s])
+    diagonal = gtsam.noiseModel.Diagonal.Sigmas
+    graph.add(gtsam.PriorFactorVector(scale_key(d), np.array([point_scale, 1.0, 0.0]), diagonal(sigmas)))
+    arm = point_scale * np.array([described.antenna_x_m, described.antenna_y_m])
+    graph.add(gtsam.PriorFactorVector(antenna_key(d), arm, diagonal(np.full(2, priors.antenna_m))))
+    graph.add(gtsam.PriorFactorVector(sensor_key(d), np.zeros(6), diagonal(np.full(6, 1e-3))))
+    graph.add(gtsam.PriorFactorVector(turn_bias_key(d, 0), np.zeros(1), diagonal(np.array([turn_bias]))))
+    walk = turn_bias * priors.turn_bias_walk_fraction * math.sqrt(priors.turn_bias_knot_s / 60.0)
+    for knot in range(1, len(prepared.calibration.turn_bias)):
+        keys = turn_bias_key(d, knot - 1), turn_bias_key(d, knot)
+        graph.add(decay_factor(*keys, decay=1.0, sigma_m=walk, size=1))
+
+
+def fix_bias_stamps(prepared: PreparedDrive, fixes: FixSettings) -> Ints:
+    """Stamps (g,) of the knots of the slow fix error, a third of its time apart; none if it is no state."""
+    if fixes.bias_sigma_m <= 0.0 or not prepared.fix_usable.any():
+        return np.zeros(0, dtype=np.int64)
+    step_ns = round(fixes.bias_time_s / 3.0 * 1e9)
+    usable = prepared.drive.fixes.stamp_ns[prepared.fix_usable]
+    return np.arange(int(usable[0]), int(usable[-1]) + 2 * step_ns, step_ns, dtype=np.int64)
+
+
+def chosen_fixes(prepared: PreparedDrive, allowed: Bools, *, spacing_m: float) -> Ints:
+    """The first allowed fix (indices) of every `spacing_m` of path."""
+    rows = np.nonzero(allowed & prepared.fix_usable)[0]
+    cell = np.floor(prepared.fix_path_m[rows] / spacing_m)
+    return rows[np.unique(cell, return_index=True)[1]]
+
+
+def add_fix_bias(graph: gtsam.NonlinearFactorGraph, d: int, knot_ns: Ints, fixes: FixSettings) -> None:
+    """The slow error of a drive's fixes as a Gauss-Markov sequence."""
+    if not len(knot_ns):
+        return
+    first = gtsam.noiseModel.Isotropic.Sigma(2, fixes.bias_sigma_m)
+    graph.add(gtsam.PriorFactorVector(fix_bias_key(d, 0), np.zeros(2), first))
+    decay = math.exp(-float(knot_ns[1] - knot_ns[0]) * 1e-9 / fixes.bias_time_s) if len(knot_ns) > 1 else 0.0
+    sigma_m = fixes.bias_sigma_m * math.sqrt(1.0 - decay**2)
+    for knot in range(len(knot_ns) - 1):
+        graph.add(decay_factor(fix_bias_key(d, knot), fix_bias_key(d, knot + 1), decay=decay, sigma_m=sigma_m, size=2))
+
+
+def add_fixes(
+    graph: gtsam.NonlinearFactorGraph, prepared: PreparedDrive, rows: Ints, *, fixes: FixSettings, robust: bool
+) -> None:
+    """Edges from the chosen fixes (indices) to the map's origin."""
+    d, knot_ns = prepared.index, fix_bias_stamps(prepared, fixes)
+    add_fix_bias(graph, d, knot_ns, fixes)
+    noise = with_cauchy(gtsam.noiseModel.Isotropic.Sigma(2, fixes.sigma_m), fixes.cauchy_scale if robust else None)
+    for row in rows:
+        keys = [pose_key(d, int(prepared.fix_keyframe[row])), antenna_key(d)]
+        weight = (0.0, 0.0)
+        if len(knot_ns) > 1:
+            place = float(prepared.drive.fixes.stamp_ns[row] - knot_ns[0]) / float(knot_ns[1] - knot_ns[0])
+            knot = min(int(place), len(knot_ns) - 2)
+            weight = (1.0 - (place - knot), place - knot)
+            keys += [fix_bias_key(d, knot), fix_bias_key(d, knot + 1)]
+        offset = prepared.fix_offset[row]
+        graph.add(fix_factor(tuple(keys), prepared.fix_m[row], T_keyframe_base=offset, bias_weight=weight, noise=noise))
+
+
+def add_sightings(
+    graph: gtsam.NonlinearFactorGraph, sightings: Sightings, landmark: Ints, *, cauchy_scale: float | None
+) -> None:
+    """Bearing and range from keyframe to landmark; `landmark` (s,) by sighting, negative ones left out."""
+    x, y = sightings.point_m.T
+    range_m = np.hypot(x, y)
+    rows = np.nonzero((landmark >= 0) & (range_m > MIN_RANGE_M))[0]
+    to_polar = np.stack(
+        [np.stack([-y / range_m**2, x / range_m**2], -1), np.stack([x / range_m, y / range_m], -1)], -2
+    )
+    covariance = to_polar @ sightings.covariance @ to_polar.transpose(0, 2, 1)
+    bearing = np.arctan2(y, x)
+    for row in rows:
+        noise = with_cauchy(gtsam.noiseModel.Gaussian.Covariance(covariance[row]), cauchy_scale)
+        keys = pose_key(int(sightings.drive[row]), int(sightings.keyframe[row])), landmark_key(int(landmark[row]))
+        graph.add(gtsam.BearingRangeFactor2D(*keys, gtsam.Rot2(bearing[row]), range_m[row], noise))
+
+
+def add_labels(graph: gtsam.NonlinearFactorGraph, labels: TiedLabels, *, cauchy_scale: float | None) -> None:
+    """Anchors: labels tied to landmarks, through their image's offset where they have an image."""
+    for i, sigma_m in enumerate(labels.image_sigma_m):
+        graph.add(gtsam.PriorFactorVector(image_key(i), np.zeros(2), gtsam.noiseModel.Isotropic.Sigma(2, sigma_m)))
+    for row, landmark in enumerate(labels.landmark):
+        keys = [landmark_key(int(landmark))]
+        if labels.image[row] >= 0:
+            keys.append(image_key(int(labels.image[row])))
+        noise = with_cauchy(gtsam.noiseModel.Isotropic.Sigma(2, labels.sigma_m[row]), cauchy_scale)
+        graph.add(anchor_factor(tuple(keys), labels.label_m[row], noise=noise))
+
+
+def fleet_graph(prepared: Sequence[PreparedDrive], priors: CalibrationPriors, *, point_scale: float) -> gtsam.NonlinearFactorGraph:
+    """The graph of what every solve has: odometry and calibration priors of all drives."""
+    graph = gtsam.NonlinearFactorGraph()
+    for each in prepared:
+        add_motions(graph, each)
+        add_calibration_priors(graph, each, priors, point_scale=point_scale)
+    return graph

@@ -1,0 +1,115 @@
+"""What can be chosen about a solve; every number has a unit in its name and a source beside it."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+Method = Literal["rigid", "loose", "anchored"]
+Edges = Literal["paper", "honest"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FixSettings:
+    """How GNSS fixes enter the graph: an edge every `spacing_m` of path, white error `sigma_m` per axis, and a
+    slow error per drive, Gauss-Markov with `bias_sigma_m` over `bias_time_s` (0: none)."""
+
+    spacing_m: float
+    sigma_m: float
+    bias_sigma_m: float
+    bias_time_s: float
+    cauchy_scale: float  # residuals beyond this many sigmas count ever less
+
+
+# Yi, Worrall and Nebot, section III-B: one edge every 10 m of travel, sigma 5 m east and north.
+PAPER_EDGES = FixSettings(spacing_m=10.0, sigma_m=5.0, bias_sigma_m=0.0, bias_time_s=1.0, cauchy_scale=2.0)
+# The error of real receivers is correlated over tens of seconds: white part and slow part apart.
+HONEST_EDGES = FixSettings(spacing_m=2.0, sigma_m=0.5, bias_sigma_m=2.5, bias_time_s=60.0, cauchy_scale=2.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CalibrationPriors:
+    """1-sigma of the calibration states around their nominal values."""
+
+    speed_scale: float = 0.03
+    turn_scale_imu: float = 0.005
+    turn_scale_steering: float = 0.10
+    turn_scale_wheels: float = 0.20
+    turn_bias_imu_radps: float = 0.02
+    turn_bias_steering_rad: float = 0.03
+    turn_bias_wheels_radpm: float = 0.02
+    turn_bias_walk_fraction: float = 0.10  # of the bias sigma, per sqrt(minute)
+    turn_bias_knot_s: float = 60.0
+    delay_s: float = 0.05
+    antenna_m: float = 0.30
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OdometrySettings:
+    """Random part of odometry (see OdometryNoise) and where keyframes stand."""
+
+    along_m: float = 0.03
+    across_m: float = 0.02
+    heading_rad: float = 0.004
+    heading_imu_rad: float = 0.0005
+    heading_rad_per_sqrt_s: float = 0.0005
+    turn_fraction: float = 0.02
+    turn_fraction_imu: float = 0.002
+    floor_m: float = 0.005
+    floor_rad: float = 0.0005
+    keyframe_m: float = 2.0
+    keyframe_rad: float = 0.2
+    max_gap_s: float = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DetectionSettings:
+    """Noise of landmark detections and how they become landmarks."""
+
+    range_sigma_m: float = 0.15
+    bearing_sigma_rad: float = 0.010
+    max_range_m: float = 40.0
+    common_sigma_m: float = 0.05  # error all detections of one keyframe share: timing, tilt, which side is seen
+    track_gate_m: float = 1.0
+    track_gap_s: float = 4.0
+    min_detections: int = 5
+    segment_m: float = 60.0
+    vote_reach_m: float = 9.0
+    vote_cell_m: float = 0.75
+    min_votes: int = 5
+    merge_gate_m: float = 1.0
+    split_gate_m: float = 1.5
+    cauchy_scale: float = 3.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnchorSettings:
+    """How labels find their landmarks and when they are disbelieved."""
+
+    neighbourhood_m: float = 120.0
+    vote_reach_m: float = 12.0
+    vote_cell_m: float = 0.6
+    min_votes: int = 5
+    gate_sigmas: float = 3.5
+    second_ratio: float = 2.0
+    cauchy_scale: float = 2.0
+    outlier_sigmas: float = 4.0
+    rounds: int = 5
+    landmark_sigma_m: float = 0.10  # local error of a landmark beside its label
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SolveSettings:
+    """One solve of the map."""
+
+    method: Method = "anchored"
+    edges: Edges = "honest"
+    known_association: bool = False
+    image_offsets: bool = True
+    calibration: CalibrationPriors = field(default_factory=CalibrationPriors)
+    odometry: OdometrySettings = field(default_factory=OdometrySettings)
+    detections: DetectionSettings = field(default_factory=DetectionSettings)
+    anchors: AnchorSettings = field(default_factory=AnchorSettings)
+
+    @property
+    def fixes(self) -> FixSettings:
+        """How fixes enter the graph."""
+        return PAPER_EDGES if self.edges == "paper" else HONEST_EDGES
