@@ -42,7 +42,7 @@ class Workbench:
     folder: Path
     drives: Path
     program: tuple[str, ...]
-    done: dict[tuple[str, ...], Outcome] = field(default_factory=dict)
+    done: dict[tuple[str, ...], Outcome | CommandFailed] = field(default_factory=dict)
 
     def path(self, name: str) -> str:
         """A path in the temporary folder."""
@@ -55,11 +55,20 @@ class Workbench:
         return str((self.drives / name).resolve())
 
     def run(self, *words: str | int | float) -> Outcome:
-        """The outcome of `trigpoint` with these words; the same words are run once. Raises CommandFailed."""
+        """The outcome of `trigpoint` with these words; the same words are run once, failed or not.
+
+        Raises CommandFailed.
+        """
         arguments = tuple(str(word) for word in words)
         if arguments not in self.done:
-            self.done[arguments] = self._outcome(arguments)
-        return self.done[arguments]
+            try:
+                self.done[arguments] = self._outcome(arguments)
+            except CommandFailed as error:
+                self.done[arguments] = error
+        outcome = self.done[arguments]
+        if isinstance(outcome, CommandFailed):
+            raise outcome
+        return outcome
 
     def _outcome(self, arguments: tuple[str, ...]) -> Outcome:
         shown = shlex.join(("trigpoint", *arguments)).replace(str(self.folder), FOLDER_NAME)

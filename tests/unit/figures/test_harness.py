@@ -16,7 +16,7 @@ import json, sys
 open("calls", "a").write("x")
 json.dump({"words": len(sys.argv) - 1, "deep": {"m": 0.5}}, sys.stdout)
 """
-FAILING = "import sys; sys.exit('latitude 91: at most 90')"
+FAILING = "import sys; open('calls', 'a').write('x'); sys.exit('latitude 91: at most 90')"
 
 
 @pytest.fixture
@@ -27,6 +27,10 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workbench:
 
 def constant(value: float) -> Figure:
     return Figure(name="f", unit="m", target=at_most(1.0), measure=lambda bench: Measurement(value=value, command="c"))
+
+
+def run_ingest(bench: Workbench) -> Measurement:
+    return Measurement(value=0.0, command=bench.run("ingest").command)
 
 
 def test_a_number_is_read_by_its_dotted_path(bench: Workbench) -> None:
@@ -48,10 +52,17 @@ def test_a_number_that_is_not_there_is_named(bench: Workbench, path: str) -> Non
         bench.run("a", "--json").at(path)
 
 
-def test_a_failed_command_gives_its_status_and_last_line(tmp_path: Path) -> None:
+def test_a_failed_command_gives_its_status_and_last_line(bench: Workbench, tmp_path: Path) -> None:
     failing = Workbench(tmp_path, tmp_path, (sys.executable, "-c", FAILING))
     with pytest.raises(CommandFailed, match="trigpoint ingest: exit status 1: latitude 91: at most 90"):
         failing.run("ingest")
+
+
+def test_a_failed_command_is_not_tried_again(bench: Workbench, tmp_path: Path) -> None:
+    failing = Workbench(tmp_path, tmp_path, (sys.executable, "-c", FAILING))
+    rows = measured_lines("g", [Figure(name=name, unit="", target=None, measure=run_ingest) for name in "ab"], failing)
+    assert [row["holds"] for row in rows] == [False, False]
+    assert (tmp_path / "calls").read_text() == "x"
 
 
 def test_output_that_is_not_json_is_named(tmp_path: Path) -> None:
