@@ -37,6 +37,7 @@ class Journal:
         self.pending_count = 0
         self.admission = admission_from(log, settings)
         self.tally = Tally()
+        self._refused_number = log.next_number(REFUSED_STREAM)
         self._frame_pinned = pinned_frame(log) is not None
 
     def take(self, message: RawMessage) -> None:
@@ -72,9 +73,10 @@ class Journal:
     def refuse(self, message: RawMessage, error: EventRejected) -> None:
         """The message counted by its reason, and kept if it was not refused before."""
         self.tally.refused[message.identity.source, error.reason] += 1
-        number = self._log.next_number(REFUSED_STREAM) + len(self._pending.get(REFUSED_STREAM, ()))
-        refusal = refusal_of(message, error, payload_limit=self._settings.refused_payload_limit, number=number)
+        limit = self._settings.refused_payload_limit
+        refusal = refusal_of(message, error, payload_limit=limit, number=self._refused_number)
         if self.admission.refuse(refused_identity(refusal)):
+            self._refused_number += 1
             self._add(REFUSED_STREAM, refusal)
 
     def _add(self, stream: str, envelope: Envelope[Event]) -> None:
