@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import click
 import numpy as np
@@ -39,6 +39,13 @@ class CommandIncomplete(InputError):
         self.answer = answer
 
 
+class PartDone(Protocol):
+    """Hears how much is done."""
+
+    def __call__(self, done: int, total: int) -> None:
+        """`done` of `total` are done."""
+
+
 class Screen:
     """Where progress shows: standard error, except that `--json` into a file keeps it silent."""
 
@@ -56,7 +63,7 @@ class Screen:
             yield heard
 
     @contextmanager
-    def part_of(self, what: str) -> Iterator[Callable[[int, int], None]]:
+    def part_of(self, what: str) -> Iterator[PartDone]:
         """A bar that hears how many are done, of how many."""
         with self._bar(what, unit_scale=True) as bar:
 

@@ -1,3 +1,116 @@
 """`trigpoint report`: the newest map version as one page."""
 
-CURVE_DRAWS = 200
+from dataclasses import replace
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from platform import python_version
+
+import click
+
+from trigpoint.errors import InputError
+from trigpoint.events.solved import LabelReduction
+from trigpoint.logs.ports import EventLog
+from trigpoint_cli.data_dir import DataDirectory, data_option
+from trigpoint_cli.output import Answer, Screen, answering
+from trigpoint_cli.pipeline import read_inputs, settings_for, solve
+from trigpoint_evaluation.app import (
+    Evaluated,
+    TruthEvaluation,
+    evaluate_truth,
+    logged_estimates,
+    logged_map,
+    logged_refusals,
+    read_truth,
+)
+from trigpoint_evaluation.core.draws import (
+    MOST_LABELLED,
+    LeaveOutDraws,
+    LeaveOutResult,
+    image_labels,
+    left_out_curve,
+    untied_residuals_m,
+)
+from trigpoint_evaluation.report.content import LeaveOutCurves, ReportContent, UntiedResiduals
+from trigpoint_evaluation.report.page import report_page
+from trigpoint_optimisation.core.solve import Solution
+
+CURVE_DRAWS = 200  # for every number of tied labels: enough for a smooth band
+SOFTWARE = ("trigpoint", "gtsam", "filterpy", "numpy", "scipy", "pyproj", "mcap", "eclipse-zenoh", "matplotlib")
+
+
+@click.command("report")
+@data_option
+@click.option(
+    "--truth", "truth_path", type=click.Path(path_type=Path), metavar="FILE", help="Truth to hold it against."
+)
+@answering
+def command(data: DataDirectory, truth_path: Path | None, *, screen: Screen) -> Answer:
+    """Write the report of the newest map version to report.html in the data directory."""
+    if truth_path is None and data.truth.is_file():
+        truth_path = data.truth
+    with data.opened_log() as log:
+        write_report(data, log, screen, truth_path=truth_path)
+        map_version = logged_map(log).head.map_version
+    size = data.report.stat().st_size
+    values = {"report": str(data.report), "size_bytes": size, "map_version": map_version}
+    return Answer(values, (f"wrote {data.report}, {size / 1e6:.1f} MB",))
+
+
+def write_report(
+    data: DataDirectory, log: EventLog, screen: Screen, *, truth_path: Path | None, solution: Solution | None = None
+) -> TruthEvaluation | None:
+    """The report in its place, and the evaluation against truth where there is truth.
+
+    `solution` is the newest map version's where it was just solved; else it is solved again for its held-out anchors.
+    """
+    solved = logged_map(log)
+    inputs, estimates = read_inputs(log, screen), logged_estimates(log)
+    if solution is None and inputs.anchors:
+        settings = settings_for("anchored", inputs.anchors)
+        solution = solve(inputs, settings, screen, verdicts=estimates.verdicts, what="solving for held-out anchors")
+    evaluated = Evaluated(solved=solved, frame=inputs.frame, drives=inputs.drives, verdicts=estimates.verdicts)
+    truth = None if truth_path is None else evaluate_truth(evaluated, read_truth(truth_path))
+    content = ReportContent(
+        evaluated=evaluated,
+        anchors=inputs.anchors,
+        poses=estimates.poses,
+        refusals=logged_refusals(log),
+        versions=(*((name, _version(name)) for name in SOFTWARE), ("Python", python_version())),
+        truth=truth,
+    )
+    if solution is not None and inputs.anchors:
+        content = _with_reduction(content, solution.reduction(), screen)
+    with screen.part_of("writing the report") as progress:
+        _write(data.report, report_page(content, progress=progress))
+    return truth
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "not installed as a distribution"
+
+
+def _with_reduction(content: ReportContent, reduction: LabelReduction, screen: Screen) -> ReportContent:
+    """The content with what held-out anchors say."""
+    if not reduction.labels:
+        return content
+    draws = LeaveOutDraws(draws=CURVE_DRAWS, seed=0)
+    with screen.part_of("leaving out") as progress:
+        everywhere = left_out_curve(reduction, draws, progress=progress)
+    blocked = left_out_curve(reduction, replace(draws, blocked=True))
+    image, within = "", tuple[LeaveOutResult, ...]()
+    if reduction.images:
+        image, _ = image_labels(reduction, MOST_LABELLED)
+        within = left_out_curve(reduction, draws, image=image)
+    curves = LeaveOutCurves(everywhere=everywhere, blocked=blocked, image=image, within_image=within)
+    untied = UntiedResiduals(labels=reduction.labels, residual_m=untied_residuals_m(reduction))
+    return replace(content, curves=curves, untied=untied)
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: the report cannot be written: {error}") from error

@@ -1,0 +1,1 @@
+"""One page a person can look at: pictures, tables, and what they mean."""
