@@ -110,10 +110,15 @@ def within_limits(event: Observed) -> Observed:
     return event
 
 
+_INTERVALS = {
+    kind: tuple((limit.name, limit.lowest, limit.highest, limit) for limit in limits) for kind, limits in LIMITS.items()
+}
+
+
 def _require_fields(event: Observed | LandmarkDetection) -> None:
-    for limit in LIMITS[type(event)]:
-        value = getattr(event, limit.name)
-        if not limit.lowest <= value <= limit.highest and not (limit.or_nan and value != value):
+    for name, lowest, highest, limit in _INTERVALS[type(event)]:
+        value = getattr(event, name)
+        if not lowest <= value <= highest and not (limit.or_nan and value != value):
             raise _refusal(event, limit, value)
 
 

@@ -35,15 +35,17 @@ def validate(
     `described` tells whether the drive's VehicleDescribed was accepted before, `stamps` are the drive's so far;
     `fleet` names the only vehicles allowed, None allows all that describe themselves. Raises EventRejected.
     """
-    _require_identity(message.identity)
+    identity, stamp_ns = message.identity, message.stamp_ns
+    _require_identity(identity)
     event = decode(message.schema_name, message.payload)
     if type(event) not in OBSERVED:
         raise EventRejected(UNKNOWN_SCHEMA, f"{message.schema_name!r} is not what a vehicle may send")
     observed: Observed = event  # type: ignore[assignment]  # one of OBSERVED
-    _require_vehicle(message.identity, observed, described=described, fleet=fleet)
+    if not described or type(event) is VehicleDescribed:
+        _require_vehicle(identity, observed, fleet=fleet)
     accepted = within_limits(observed)
-    require_stamp(type(accepted), message.stamp_ns, stamps, limits)
-    return Envelope(message.identity, message.stamp_ns, accepted)
+    require_stamp(type(accepted), stamp_ns, stamps, limits)
+    return Envelope(identity, stamp_ns, accepted)
 
 
 def _require_identity(identity: EventIdentity) -> None:
@@ -53,11 +55,8 @@ def _require_identity(identity: EventIdentity) -> None:
         raise EventRejected(UNIDENTIFIED, f"boot id of {len(identity.boot_id)} characters, limit {TEXT_LIMIT}")
 
 
-def _require_vehicle(
-    identity: EventIdentity, event: Observed, *, described: bool, fleet: frozenset[str] | None
-) -> None:
-    if described and type(event) is not VehicleDescribed:
-        return
+def _require_vehicle(identity: EventIdentity, event: Observed, *, fleet: frozenset[str] | None) -> None:
+    """Nothing, if the event is a description by which its drive becomes known."""
     vehicle = identity.source
     if fleet is not None and vehicle not in fleet:
         raise EventRejected(UNKNOWN_VEHICLE, f"{vehicle!r} is not one of the fleet's {len(fleet)}")
