@@ -17,9 +17,12 @@ OUTAGE_INTERVALS = 4.0
 KEPT_INTERVALS = 5
 RUN_FIXES = 4  # that agree among themselves end an outage
 RUN_SPAN_S = 1.5
+WIDE_GATE_M = 50.0  # radius from which on a gate lets wrong clusters through:
+WIDE_RUN_SPAN_S = 25.0  # a run must then outlast them (20 s were seen)
+LOST_HEADING_RAD = 0.8  # sigma from which on a heading says nothing, and neither does a gate
 KEPT_RUN_FIXES = 64
 RUN_SIGMAS = 3.0  # within which a fix agrees with its run
-RELOCATION_SPAN_S = 30.0  # of a run outside the gate before it is believed: reflections last less
+RELOCATION_SPAN_S = 40.0  # of a run outside the gate before it is believed: reflections last less
 DRIFT_M = 3.0  # by which a run may miss the gate and still be believed: this,
 DRIFT_SHARE = 0.02  # this share of the way since the last accepted fix,
 DRIFT_SIGMAS = 3.0  # and this many sigmas of the prediction
@@ -91,8 +94,8 @@ def judged(hypothesis: Hypothesis, fix: Fix, estimator: Estimator, *, limit: flo
     if inside and not outage:
         return _accepted(heard, correction.belief, fix), _verdict(correction, limit, INSIDE)
     running = replace(heard, run=_extended_run(heard, correction, fix))
-    if outage and _is_complete(running.run):
-        if inside:
+    if outage and not has_lost_heading(hypothesis):
+        if inside and _is_complete(running.run, _gate_radius_m(correction, limit)):
             return _accepted(running, correction.belief, fix), _verdict(correction, limit, REACQUIRED)
         if _span_s(running.run) >= RELOCATION_SPAN_S and _is_within_drift(running, correction):
             return _accepted(running, _relocated(running, fix), fix), _verdict(correction, limit, REACQUIRED)
@@ -115,9 +118,16 @@ def _heard(hypothesis: Hypothesis, stamp_ns: int) -> Hypothesis:
 
 
 def _verdict(correction: Correction, limit: float, reason: str) -> Verdict:
-    widest_m2 = float(np.linalg.eigvalsh(correction.innovation_covariance)[-1])
     accepted = reason in (INSIDE, REACQUIRED)
-    return Verdict(accepted, reason, correction.nis, correction.innovation_m, math.sqrt(limit * widest_m2))
+    return Verdict(accepted, reason, correction.nis, correction.innovation_m, _gate_radius_m(correction, limit))
+
+
+def _gate_radius_m(correction: Correction, limit: float) -> float:
+    return math.sqrt(limit) * _widest_sigma_m(correction)
+
+
+def _widest_sigma_m(correction: Correction) -> float:
+    return math.sqrt(float(np.linalg.eigvalsh(correction.innovation_covariance)[-1]))
 
 
 def _accepted(hypothesis: Hypothesis, belief: Belief, fix: Fix) -> Hypothesis:
@@ -153,8 +163,14 @@ def _mean_offset(run: tuple[RunFix, ...]) -> tuple[float, float]:
     return sum(fix.offset_x_m for fix in run) / len(run), sum(fix.offset_y_m for fix in run) / len(run)
 
 
-def _is_complete(run: tuple[RunFix, ...]) -> bool:
-    return len(run) >= RUN_FIXES and _span_s(run) >= RUN_SPAN_S
+def has_lost_heading(hypothesis: Hypothesis) -> bool:
+    """Whether the heading is so uncertain that only a new alignment can bring it back."""
+    return bool(hypothesis.belief.covariance[HEADING, HEADING] > LOST_HEADING_RAD**2)
+
+
+def _is_complete(run: tuple[RunFix, ...], gate_radius_m: float) -> bool:
+    needed_s = RUN_SPAN_S if gate_radius_m < WIDE_GATE_M else WIDE_RUN_SPAN_S
+    return len(run) >= RUN_FIXES and _span_s(run) >= needed_s
 
 
 def _span_s(run: tuple[RunFix, ...]) -> float:
@@ -162,10 +178,13 @@ def _span_s(run: tuple[RunFix, ...]) -> float:
 
 
 def _is_within_drift(hypothesis: Hypothesis, correction: Correction) -> bool:
-    offset_m = math.hypot(*_mean_offset(hypothesis.run))
+    return math.hypot(*_mean_offset(hypothesis.run)) <= drift_bound_m(hypothesis, _widest_sigma_m(correction))
+
+
+def drift_bound_m(hypothesis: Hypothesis, sigma_m: float) -> float:
+    """How far a hypothesis may have strayed since its last accepted fix; `sigma_m` of its prediction."""
     way_m = hypothesis.odometer_m - hypothesis.accepted_odometer_m
-    sigma_m = math.sqrt(float(np.linalg.eigvalsh(correction.innovation_covariance)[-1]))
-    return offset_m <= DRIFT_M + DRIFT_SHARE * way_m + DRIFT_SIGMAS * sigma_m
+    return DRIFT_M + DRIFT_SHARE * way_m + DRIFT_SIGMAS * sigma_m
 
 
 def _relocated(hypothesis: Hypothesis, fix: Fix) -> Belief:

@@ -25,6 +25,8 @@ from trigpoint_filtering.core.gate import (
     Fix,
     Hypothesis,
     Verdict,
+    drift_bound_m,
+    has_lost_heading,
     judged,
 )
 from trigpoint_filtering.core.initialisation import Seeker, after_pair, aligned, placed, prior_calibration
@@ -58,7 +60,8 @@ UNINITIALISED = "not initialised"
 LOST_AFTER_S = 30.0  # without wheels nothing is left of a dead-reckoned position
 LATE_LIMIT_S = 1.0  # a fix later than this is not worth moving forward
 SUPPORT_S = (30.0, 120.0)  # a second hypothesis needs as much as the first had, within these bounds
-SUPPORT_FIXES = 20
+NEAR_SUPPORT_S = 25.0  # for one that the first may have drifted from
+SUPPORT_FIXES_PER_S = 0.3  # accepted, of those seconds
 ALTERNATE_REJECTIONS = 10  # in a row end a second hypothesis
 FORMER_KEPT_S = 300.0  # a deposed hypothesis may come back for this long
 DEAF_S = 60.0  # of rejections only
@@ -373,12 +376,24 @@ def _with_seeker(track: Track, hypothesis: Hypothesis, fix: Fix) -> Track:
 
 
 def _outweighs(alternate: Hypothesis, hypothesis: Hypothesis) -> bool:
-    """Whether the second hypothesis has agreed with the fixes for long, and the first with none meanwhile."""
+    """Whether the second hypothesis has agreed with the fixes for long, and the first with none meanwhile.
+
+    Where the first has lost its heading or may have drifted to the second, a short agreement is enough; else it must be as long as
+    the first's own was, within bounds.
+    """
     had_s = (hypothesis.accepted_ns - hypothesis.born_ns) * SECONDS_PER_NS
     needed_s = min(max(had_s, SUPPORT_S[0]), SUPPORT_S[1])
+    if has_lost_heading(hypothesis) or _is_near(alternate, hypothesis):
+        needed_s = NEAR_SUPPORT_S
     support_s = (alternate.accepted_ns - alternate.born_ns) * SECONDS_PER_NS
     alone = hypothesis.accepted_ns <= alternate.born_ns
-    return alone and support_s >= needed_s and alternate.accepted_count >= SUPPORT_FIXES
+    return alone and support_s >= needed_s and alternate.accepted_count >= needed_s * SUPPORT_FIXES_PER_S
+
+
+def _is_near(alternate: Hypothesis, hypothesis: Hypothesis) -> bool:
+    sigma_m = math.sqrt(float(hypothesis.belief.covariance.diagonal()[X : Y + 1].max()))
+    apart_m = float(np.hypot(*(alternate.belief.mean[X : Y + 1] - hypothesis.belief.mean[X : Y + 1])))
+    return apart_m <= drift_bound_m(hypothesis, sigma_m)
 
 
 def _with_former(track: Track, fix: Fix, verdict: Verdict) -> Track:
