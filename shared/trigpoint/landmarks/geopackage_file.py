@@ -94,12 +94,13 @@ def close(connection: Connection) -> None:
 
 def _connected(path: Path, *, read_only: bool) -> Connection:
     def driver() -> sqlite3.Connection:
-        mode = "ro" if read_only else "rwc"
+        mode = "rw" if read_only else "rwc"  # even a reader takes back what a killed writer left half done
         return sqlite3.connect(f"{path.absolute().as_uri()}?mode={mode}", uri=True, timeout=BUSY_TIMEOUT_S)
 
     engine = create_engine("sqlite://", creator=driver, poolclass=StaticPool, isolation_level="AUTOCOMMIT")
     connection = engine.connect()
     driver_of(connection).execute(f"PRAGMA cache_size = -{CACHE_KIB}")
+    driver_of(connection).execute(f"PRAGMA query_only = {int(read_only)}")
     for name, function in SQL_FUNCTIONS.items():
         driver_of(connection).create_function(name, 1, function, deterministic=True)
     return connection
