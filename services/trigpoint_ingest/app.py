@@ -61,12 +61,13 @@ class IngestService:
         if order is None:
             following = self._journal.admission.acknowledged(drive) + 1
             order = self._orders[drive] = SequenceOrder(next_sequence=following, capacity=self._settings.held_limit)
-        for released in order.offer(message):
-            self._journal.take(released)
+        released = order.offer(message)
+        for next_in_order in released:
+            self._journal.take(next_in_order)
+        if released:
+            self._gap_since_s.pop(drive, None)
         if order.held:
             self._gap_since_s.setdefault(drive, time.monotonic())
-        else:
-            self._gap_since_s.pop(drive, None)
         self._to_acknowledge.add(drive)
 
     def flush(self) -> None:

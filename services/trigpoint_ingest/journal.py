@@ -84,13 +84,18 @@ class Journal:
         self.pending_count += 1
 
     def flush(self) -> None:
-        """Everything pending is durable, and published after that. Raises AppendFailed: nothing is acknowledged."""
-        pending, self._pending, self.pending_count = self._pending, {}, 0
-        for stream in sorted(pending):
-            self._log.append(stream, pending[stream])
+        """Everything pending is durable, and published after that.
+
+        Raises AppendFailed: what was not appended stays pending.
+        """
+        appended: list[list[Envelope[Event]]] = []
+        for stream in sorted(self._pending):
+            self._log.append(stream, self._pending[stream])
+            appended.append(self._pending.pop(stream))
+            self.pending_count -= len(appended[-1])
         if self._bus is not None:
-            for stream in sorted(pending):
-                self._publish(self._bus, pending[stream])
+            for rows in appended:
+                self._publish(self._bus, rows)
 
     def _publish(self, bus: Bus, rows: Sequence[Envelope[Event]]) -> None:
         """The rows on their keys; where nobody listens to a key, nothing is sent: the log has it."""

@@ -215,6 +215,21 @@ def test_nothing_is_acknowledged_that_could_not_be_appended(rows: Rows) -> None:
     bus.close()
 
 
+def test_an_append_that_failed_is_tried_again_before_anything_is_acknowledged(rows: Rows) -> None:
+    bus = MemoryBus()
+    log = FullLog()
+    service = IngestService(log, bus, replace(SETTINGS, batch_count=150, batch_s=1e9))
+    heard = bus.subscribe("trigpoint/v1/ack/*")
+    for row in rows[:400]:
+        bus.publish(live(row))
+    with pytest.raises(AppendFailed):
+        drain(service)
+    with pytest.raises(AppendFailed):
+        service.close()
+    assert max(message.identity.sequence for message in received(heard)) == len(stored(log)) - 1
+    bus.close()
+
+
 def test_a_gap_is_given_up_after_a_while_and_what_waited_goes_in(rows: Rows) -> None:
     bus = MemoryBus()
     log = MemoryLog()
