@@ -16,7 +16,7 @@ from trigpoint_evaluation.report.style import ANCHOR, FAINT, FILTERED, INK, RAW,
 Floats = NDArray[np.float64]
 
 WIDE_IN, SQUARE_IN = (7.6, 2.5), (7.6, 3.3)
-NIS_FLOOR = 1e-3  # what a logarithmic axis begins at
+NIS_FLOOR = 1e-2  # what a logarithmic axis begins at
 WINDOW = 60  # fixes in the running mean of NIS
 PAPER_UNTIED_M = 1.8  # Yi, Worrall and Nebot: mean error of 50 poles before any is tied
 PAPER_PLATEAU_M = (0.57, 0.75)  # and the plateau they reach over several images
@@ -37,6 +37,7 @@ def nis_svg(name: str, judged: JudgedFixes) -> str:
         )
         _draw_gate(axes, judged, minute, known)
         axes.set_yscale("log")
+        axes.minorticks_off()
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.set_xlabel("time since the first fix (min)")
         axes.set_ylabel("NIS (2 degrees of freedom)")
@@ -101,8 +102,8 @@ def leave_out_svg(name: str, curves: LeaveOutCurves) -> str:
     def draw(figure: Figure) -> None:
         axes = figure.add_subplot()
         last = max([one.tied for one in curves.everywhere], default=1)
-        axes.fill_between([0, last], *PAPER_PLATEAU_M, color=ANCHOR, alpha=0.13, linewidth=0)
-        axes.text(last, PAPER_PLATEAU_M[1], "the paper's plateau, 0.57–0.75 m ", ha="right", va="bottom", fontsize=8)
+        plateau = "the paper's plateau, 0.57–0.75 m"
+        axes.fill_between([0, last], *PAPER_PLATEAU_M, color=ANCHOR, alpha=0.15, linewidth=0, label=plateau)
         axes.plot([0], [PAPER_UNTIED_M], "D", color=ANCHOR, markersize=5, clip_on=False, zorder=6)
         axes.annotate(
             "the paper, none tied: 1.8 m", (0, PAPER_UNTIED_M), (8, 0), textcoords="offset points", va="center"
@@ -114,7 +115,7 @@ def leave_out_svg(name: str, curves: LeaveOutCurves) -> str:
         axes.set_ylabel("error of the others (m)")
         axes.set_xlim(-0.4, last + 0.4)
         axes.set_ylim(bottom=0.0)
-        figure.legend(loc="outside upper left", ncols=2, handlelength=1.8)
+        figure.legend(loc="outside upper left", ncols=3, handlelength=1.8)
 
     return drawn_svg(name, SQUARE_IN, draw)
 

@@ -27,9 +27,10 @@ Floats = NDArray[np.float64]
 
 CHI2_95_2DOF = 5.991  # a 95 % ellipse's semi-axes are sqrt of this many sigmas
 WIDTH_IN = 7.6
-HEIGHT_IN = (3.2, 8.5)
+PLOT_SHARE = 0.92  # of the width: the rest is the axis and its label
+HEIGHT_IN = (3.2, 7.6)
 MARGIN_SHARE = 0.05
-VISIBLE_SHARE = 0.006  # of the picture's width: what a typical ellipse's semi-axis is brought to
+VISIBLE_SHARE = 0.0045  # of the picture's width: what a typical ellipse's semi-axis is brought to
 MAGNIFICATIONS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
 
 
@@ -92,7 +93,7 @@ def magnification(covariance_m2: Floats, extent: Extent) -> int:
 
 def picture_size(extent: Extent) -> tuple[float, float]:
     """Width and height in inches that go with equal axes."""
-    height = WIDTH_IN * extent.height_m / max(extent.width_m, 1.0) + 0.9
+    height = PLOT_SHARE * WIDTH_IN * extent.height_m / max(extent.width_m, 1.0) + 0.55
     return WIDTH_IN, float(np.clip(height, *HEIGHT_IN))
 
 
@@ -143,7 +144,7 @@ def _draw_landmarks(axes: Axes, picture: MapPicture, factor: int) -> None:
             facecolors=LANDMARK,
             edgecolors=LANDMARK,
             linewidths=0.5,
-            alpha=0.35,
+            alpha=0.25,
             zorder=5,
         )
     )

@@ -164,7 +164,7 @@ def _residual_section(drawn: _Drawn) -> Section | None:
     )
     figure = Markup(residuals_svg("residuals", before_m, after_m))
     rows = (tables.error_row("before: loose", before), tables.error_row("after: anchored", left))
-    caption = "What is left after tying is not an error of the map: held-out anchors, below, measure that."
+    caption = "What is left after tying is not an error of the map: held-out anchors, above, measure that."
     return Section("Residuals before and after", text, ((figure, caption),), (Table("", tables.ERROR_HEAD, rows),))
 
 
@@ -201,8 +201,8 @@ def _truth_section(drawn: _Drawn) -> Section | None:
     if gate.car_park_fixes:
         share = "–" if not gate.good_after else f"{gate.good_rejected_share:.1%}"
         text = (
-            f"Of {gate.car_park_fixes} fixes from inside a car park {gate.car_park_accepted} were accepted; of the good "
-            f"fixes after re-acquisition {share} were rejected."
+            f"Of {gate.car_park_fixes} fixes from inside a car park {gate.car_park_accepted} were accepted; of the "
+            f"good fixes after re-acquisition {share} were rejected."
         )
     return Section("Against truth", text, (), (tables.truth_table(truth),))
 

@@ -64,8 +64,8 @@ def drawn_svg(name: str, size_in: tuple[float, float], draw: Callable[[Figure], 
     `name` keeps the identifiers in it apart from those of other pictures on the page. The same input gives the
     same text.
     """
-    context: dict[str, Any] = {**RC, "svg.hashsalt": name}
-    with rc_context(context):
+    settings: Any = {**RC, "svg.hashsalt": name}
+    with rc_context(settings):
         figure = Figure(figsize=size_in, layout="constrained")
         FigureCanvasSVG(figure)
         draw(figure)

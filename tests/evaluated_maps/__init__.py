@@ -1,0 +1,1 @@
+"""Map versions made up for tests, near a simulated truth."""
