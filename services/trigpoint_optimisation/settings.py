@@ -1,6 +1,7 @@
 """What can be chosen about a solve; every number has a unit in its name and a source beside it."""
 
-from dataclasses import dataclass, field
+import json
+from dataclasses import asdict, dataclass, field
 from typing import Literal
 
 Method = Literal["rigid", "loose", "anchored"]
@@ -22,7 +23,7 @@ class FixSettings:
 # Yi, Worrall and Nebot, section III-B: one edge every 10 m of travel, sigma 5 m east and north.
 PAPER_EDGES = FixSettings(spacing_m=10.0, sigma_m=5.0, bias_sigma_m=0.0, bias_time_s=1.0, cauchy_scale=2.0)
 # The error of real receivers is correlated over tens of seconds: white part and slow part apart.
-HONEST_EDGES = FixSettings(spacing_m=2.0, sigma_m=0.5, bias_sigma_m=2.5, bias_time_s=60.0, cauchy_scale=2.0)
+HONEST_EDGES = FixSettings(spacing_m=2.0, sigma_m=1.5, bias_sigma_m=2.5, bias_time_s=60.0, cauchy_scale=2.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,3 +114,8 @@ class SolveSettings:
     def fixes(self) -> FixSettings:
         """How fixes enter the graph."""
         return PAPER_EDGES if self.edges == "paper" else HONEST_EDGES
+
+
+def settings_json(settings: SolveSettings) -> str:
+    """The settings as one line of JSON with sorted keys: a map version can be solved again from it."""
+    return json.dumps(asdict(settings), sort_keys=True, separators=(",", ":"))

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from trigpoint.events.drives import Drive
 from trigpoint.geodesy.poses import transform_points
 from trigpoint.geodesy.projection import MapFrame
+from trigpoint_optimisation.core.fix_noise import measured_fix_settings
 from trigpoint_optimisation.core.gauss_newton import solved
 from trigpoint_optimisation.core.graph import add_fixes, chosen_fixes, fix_bias_stamps, fleet_graph
 from trigpoint_optimisation.core.odometry import OdometryCalibration
 from trigpoint_optimisation.core.preparation import PreparedDrive, nominal_calibration, prepared_drive
 from trigpoint_optimisation.core.sightings import keyframe_points
 from trigpoint_optimisation.core.state import DriveState, MapState, shared_keys, state_of, values_of
-from trigpoint_optimisation.settings import SolveSettings
+from trigpoint_optimisation.settings import FixSettings, SolveSettings
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -25,12 +26,13 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fleet:
-    """The drives of a solve. `trusted` (f,) per drive: fixes that may enter the graph."""
+    """The drives of a solve. `trusted` (f,) per drive: fixes that may enter the graph; `fixes`: how noisy they are."""
 
     frame: MapFrame
     settings: SolveSettings
     prepared: tuple[PreparedDrive, ...]
     trusted: tuple[Bools, ...]
+    fixes: tuple[FixSettings, ...]
 
 
 def prepared_fleet(
@@ -48,7 +50,9 @@ def prepared_fleet(
         for index, drive in enumerate(drives)
     )
     trusted = tuple(mask & each.fix_usable for mask, each in zip(allowed, prepared, strict=True))
-    return Fleet(frame=frame, settings=settings, prepared=prepared, trusted=trusted)
+    return Fleet(
+        frame=frame, settings=settings, prepared=prepared, trusted=trusted, fixes=(settings.fixes,) * len(prepared)
+    )
 
 
 def nominal_state(fleet: Fleet, pose: Sequence[Floats]) -> MapState:
@@ -61,10 +65,10 @@ def nominal_state(fleet: Fleet, pose: Sequence[Floats]) -> MapState:
                 scale=np.array([scale, 1.0, 0.0]),
                 turn_bias=np.zeros(len(each.calibration.turn_bias)),
                 antenna_m=scale * np.array([each.drive.described.antenna_x_m, each.drive.described.antenna_y_m]),
-                fix_bias_m=np.zeros((len(fix_bias_stamps(each, fleet.settings.fixes)), 2)),
+                fix_bias_m=np.zeros((len(fix_bias_stamps(each, fixes)), 2)),
                 sensor=np.zeros(6),
             )
-            for each, poses in zip(fleet.prepared, pose, strict=True)
+            for each, poses, fixes in zip(fleet.prepared, pose, fleet.fixes, strict=True)
         ),
         landmark_m=np.zeros((0, 2)),
         image_m=np.zeros((0, 2)),
@@ -100,6 +104,19 @@ def recalibrated(fleet: Fleet, state: MapState) -> Fleet:
     return replace(fleet, prepared=tuple(prepared))
 
 
+def with_measured_fixes(fleet: Fleet, state: MapState) -> tuple[Fleet, MapState]:
+    """The fleet with the noise of each drive's fixes as its residuals show it, and the state resized for it."""
+    fixes = tuple(
+        measured_fix_settings(each, drive, trusted, own)
+        for each, drive, trusted, own in zip(fleet.prepared, state.drives, fleet.trusted, fleet.fixes, strict=True)
+    )
+    drives = tuple(
+        replace(drive, fix_bias_m=np.zeros((len(fix_bias_stamps(each, own)), 2)))
+        for each, drive, own in zip(fleet.prepared, state.drives, fixes, strict=True)
+    )
+    return replace(fleet, fixes=fixes), replace(state, drives=drives)
+
+
 def motion_graph(fleet: Fleet) -> gtsam.NonlinearFactorGraph:
     """Odometry and calibration priors of the whole fleet."""
     return fleet_graph(fleet.prepared, fleet.settings.calibration, point_scale=fleet.frame.point_scale)
@@ -107,8 +124,8 @@ def motion_graph(fleet: Fleet) -> gtsam.NonlinearFactorGraph:
 
 def georeferenced_graph(fleet: Fleet, *, robust: bool) -> gtsam.NonlinearFactorGraph:
     """Odometry, calibration priors and the edges of trusted fixes."""
-    graph, fixes = motion_graph(fleet), fleet.settings.fixes
-    for each, trusted in zip(fleet.prepared, fleet.trusted, strict=True):
+    graph = motion_graph(fleet)
+    for each, trusted, fixes in zip(fleet.prepared, fleet.trusted, fleet.fixes, strict=True):
         rows = chosen_fixes(each, trusted, spacing_m=fixes.spacing_m)
         add_fixes(graph, each, rows, fixes=fixes, robust=robust)
     return graph

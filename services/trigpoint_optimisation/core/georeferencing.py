@@ -10,6 +10,7 @@ from trigpoint_optimisation.core.fleet import (
     nominal_state,
     recalibrated,
     solved_state,
+    with_measured_fixes,
     with_poses,
 )
 from trigpoint_optimisation.core.placing import placed_by_fixes
@@ -34,6 +35,8 @@ def georeferenced(fleet: Fleet, *, progress: Progress) -> tuple[Fleet, MapState]
         fleet = recalibrated(fleet, state)
         progress("odometry and fixes", (turn + 1) / (PLACINGS + 1))
     assert state is not None
+    if fleet.settings.edges == "honest":
+        fleet, state = with_measured_fixes(fleet, state)
     state = solved_state(georeferenced_graph(fleet, robust=True), state)
     progress("odometry and fixes", 1.0)
     return recalibrated(fleet, state), state

@@ -7,6 +7,7 @@ import gtsam
 import numpy as np
 from numpy.typing import NDArray
 
+from trigpoint.errors import AlignmentRefused
 from trigpoint_optimisation.core.gauss_newton import elimination_order
 
 Floats = NDArray[np.float64]
@@ -45,4 +46,15 @@ def pose_covariances(graph: gtsam.NonlinearFactorGraph, values: gtsam.Values, ke
         heading = values.atPose2(key).theta()
         turn = np.array([[np.cos(heading), -np.sin(heading), 0.0], [np.sin(heading), np.cos(heading), 0.0], [0, 0, 1]])
         covariance[row] = turn @ marginals.marginalCovariance(key) @ turn.T
+    return covariance
+
+
+def covariance_of(kept: Reduced) -> Floats:
+    """The covariance (2m, 2m) of a reduction. Raises AlignmentRefused where the data leave the kept states undetermined."""
+    try:
+        factor = np.linalg.cholesky(kept.information)
+    except np.linalg.LinAlgError as error:
+        raise AlignmentRefused("the landmarks' information is singular: nothing fixes the map's place") from error
+    inverse = np.linalg.inv(factor)
+    covariance: Floats = inverse.T @ inverse
     return covariance

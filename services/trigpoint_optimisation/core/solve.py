@@ -1,208 +1,284 @@
-"""The whole solve: odometry and fixes, then landmarks, then anchors; each stage starts from the converged one before."""
+"""A solved map as events, and as the Gaussian its labels can be tied to."""
 
-import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
+from hashlib import blake2b
 
-import gtsam
 import numpy as np
 from numpy.typing import NDArray
 
-from trigpoint.errors import AlignmentRefused
 from trigpoint.events.corrected import AnchorLabelled
 from trigpoint.events.drives import Drive
+from trigpoint.events.estimated import FixJudged
+from trigpoint.events.mapped import AnchorAssociated, ImageOffsetSolved, LandmarkSolved, MapSolved, TrajectorySolved
+from trigpoint.events.solved import LabelReduction, SolvedMap
 from trigpoint.geodesy.projection import MapFrame
-from trigpoint_optimisation.core.anchoring import (
-    Assignment,
-    Labels,
-    by_signature,
-    labels_of,
-    nearest_assignment,
-    residuals_m,
-    tied_labels,
-    voted_assignment,
-    without_outliers,
+from trigpoint_optimisation.core.anchoring import residuals_m
+from trigpoint_optimisation.core.fleet import Progress
+from trigpoint_optimisation.core.marginals import covariance_of, pose_covariances
+from trigpoint_optimisation.core.odometry import TurnSource
+from trigpoint_optimisation.core.preparation import PreparedDrive
+from trigpoint_optimisation.core.stages import (
+    Solved,
+    full_graph,
+    landmark_signatures,
+    quiet,
+    reduced_landmarks,
+    solve_fleet,
 )
-from trigpoint_optimisation.core.association import (
-    Association,
-    first_association,
-    fleet_sightings,
-    landmark_means,
-    renewed_association,
-    tracks_in_map,
-)
-from trigpoint_optimisation.core.fleet import Fleet, Progress, georeferenced_graph, prepared_fleet, recalibrated, solved_state
-from trigpoint_optimisation.core.georeferencing import georeferenced
-from trigpoint_optimisation.core.graph import add_labels, add_sightings
-from trigpoint_optimisation.core.marginals import Reduced, reduced
-from trigpoint_optimisation.core.sightings import Sightings
-from trigpoint_optimisation.core.state import MapState, image_key, landmark_key, values_of
-from trigpoint_optimisation.settings import SolveSettings
+from trigpoint_optimisation.core.state import DriveState, pose_key, values_of
+from trigpoint_optimisation.core.trajectory import output_stamps, poses_at
+from trigpoint_optimisation.settings import SolveSettings, settings_json
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-ASSOCIATION_ROUNDS = 3
+TRAJECTORY_STEP_S = 0.5
+COVARIANCE_POSES = 150  # per drive; between them covariances are interpolated
+UNNUMBERED = 0  # a map version until the log gives it its number
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Solved:
-    """A solved fleet: its state, which detection is of which landmark, which label of which, and the sightings."""
+@dataclass(frozen=True, kw_only=True)
+class Solution:
+    """A solved fleet with what follows from it; its events carry no version number yet."""
 
-    fleet: Fleet
-    state: MapState
-    association: Association
-    sightings: Sightings
-    labels: Labels
-    assignment: Assignment
+    solved: Solved
+
+    @cached_property
+    def landmark_covariance(self) -> Floats:
+        """Joint covariance (2l, 2l) of all landmarks in m^2, x and y of each in turn, in order of `map.landmarks`."""
+        count = 2 * self.solved.association.landmark_count
+        return covariance_of(reduced_landmarks(self.solved))[:count, :count]
+
+    @cached_property
+    def map(self) -> SolvedMap:
+        """The map as events of version UNNUMBERED, without wall time and inputs."""
+        return _solved_map(self.solved, landmark_covariance=self.landmark_covariance)
+
+    def reduction(self) -> LabelReduction:
+        """Everything but the labels marginalised onto the labelled landmarks, at the solution."""
+        return _label_reduction(self.solved)
 
 
-def quiet(stage: str, part: float) -> None:
-    """A progress listener that does nothing."""
-
-
-def solve_fleet(
+def solve_map(
     drives: Sequence[Drive],
     anchors: Sequence[AnchorLabelled],
     frame: MapFrame,
     settings: SolveSettings,
     *,
-    allowed: Sequence[Bools] | None = None,
+    verdicts: Sequence[FixJudged] | None = None,
     progress: Progress = quiet,
-) -> Solved:
-    """The fleet solved by the settings' method; `allowed` (f,) per drive says which fixes may be used.
+) -> Solution:
+    """The map of all drives by the settings' method; with `verdicts`, only fixes the filter accepted take part.
 
     Raises AlignmentRefused when the data leave a drive's place undetermined.
     """
-    masks = allowed if allowed is not None else [np.ones(len(drive.fixes.stamp_ns), dtype=bool) for drive in drives]
-    fleet = prepared_fleet(drives, frame, settings, allowed=masks)
-    fleet, state = georeferenced(fleet, progress=progress)
-    solved = _with_landmarks(fleet, state, progress)
-    if settings.method == "anchored":
-        solved = anchored(solved, labels_of(anchors, frame, image_offsets=settings.image_offsets), progress=progress)
-    return solved
+    allowed = None if verdicts is None else [accepted_fixes(drive, verdicts) for drive in drives]
+    return Solution(solved=solve_fleet(drives, anchors, frame, settings, allowed=allowed, progress=progress))
 
 
-def no_labels() -> tuple[Labels, Assignment]:
-    """No labels and nothing assigned."""
-    none = np.zeros(0, dtype=np.int64)
-    labels = Labels(
-        name=(), label_m=np.zeros((0, 2)), sigma_m=np.zeros(0), image=none, kind=(), signature=(), images=(), image_sigma_m=np.zeros(0)
+def accepted_fixes(drive: Drive, verdicts: Sequence[FixJudged]) -> Bools:
+    """Which of a drive's fixes (f,) the filter accepted; all of them if it judged none of this drive."""
+    own = {
+        verdict.fix_sequence: verdict.accepted
+        for verdict in verdicts
+        if (verdict.vehicle, verdict.boot_id) == (drive.vehicle, drive.boot_id)
+    }
+    if not any(own.values()):
+        return np.ones(len(drive.fixes.stamp_ns), dtype=bool)
+    return np.array([own.get(int(sequence), False) for sequence in drive.fixes.sequence], dtype=bool)
+
+
+def _solved_map(solved: Solved, *, landmark_covariance: Floats) -> SolvedMap:
+    landmarks = _landmarks(solved, landmark_covariance)
+    anchors = _anchors(solved, tuple(landmark.landmark for landmark in landmarks))
+    head = MapSolved(
+        map_version=UNNUMBERED,
+        method=solved.fleet.settings.method,
+        settings_json=settings_json(solved.fleet.settings),
+        inputs=(),
+        landmark_count=len(landmarks),
+        anchor_count=sum(1 for anchor in anchors if anchor.landmark),
+        wall_s=0.0,
     )
-    return labels, Assignment(landmark=none, reason=())
+    return SolvedMap(
+        head=head, trajectories=_trajectories(solved), landmarks=landmarks, anchors=anchors, images=_images(solved)
+    )
 
 
-def _with_landmarks(fleet: Fleet, state: MapState, progress: Progress) -> Solved:
-    """Landmarks associated and solved for, in rounds: each solve makes the next association surer."""
-    association = first_association(fleet, state)
-    labels, assignment = no_labels()
-    for turn in range(ASSOCIATION_ROUNDS):
-        tracks = tracks_in_map(fleet, state, association)
-        state = replace(state, landmark_m=landmark_means(tracks, association.landmark_of_track))
-        sightings = fleet_sightings(fleet, association)
-        solved = Solved(
-            fleet=fleet, state=state, association=association, sightings=sightings, labels=labels, assignment=assignment
+def _calibration(each: PreparedDrive, drive: DriveState) -> tuple[tuple[str, float, float], ...]:
+    bias_name = {
+        TurnSource.IMU: "turn_bias_radps",
+        TurnSource.STEERING: "turn_bias_rad",
+    }.get(each.source, "turn_bias_radpm")
+    values = {
+        "speed_scale": float(drive.scale[0]),
+        "turn_scale": float(drive.scale[1]),
+        "wheel_delay_s": float(drive.scale[2]),
+        bias_name: float(np.mean(drive.turn_bias)),
+        "antenna_x_m": float(drive.antenna_m[0]),
+        "antenna_y_m": float(drive.antenna_m[1]),
+    }
+    return tuple((name, value, float("nan")) for name, value in values.items())
+
+
+def _trajectories(solved: Solved) -> tuple[TrajectorySolved, ...]:
+    graph, values = full_graph(solved), values_of(solved.state)
+    chosen = [_spread(len(drive.pose), COVARIANCE_POSES) for drive in solved.state.drives]
+    keys = [pose_key(d, int(k)) for d, rows in enumerate(chosen) for k in rows]
+    covariance = np.split(pose_covariances(graph, values, keys), np.cumsum([len(rows) for rows in chosen])[:-1])
+    return tuple(
+        _trajectory(each, drive, each.stamp_ns[rows], own)
+        for each, drive, rows, own in zip(solved.fleet.prepared, solved.state.drives, chosen, covariance, strict=True)
+    )
+
+
+def _spread(count: int, most: int) -> Ints:
+    """At most `most` indices spread over 0 … count - 1, both ends included."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
+
+
+def _trajectory(each: PreparedDrive, drive: DriveState, at_ns: Ints, covariance: Floats) -> TrajectorySolved:
+    stamp_ns = output_stamps(each, step_s=TRAJECTORY_STEP_S)
+    start_ns = int(at_ns[0])
+    known_s, wanted_s = (at_ns - start_ns) * 1e-9, (stamp_ns - start_ns) * 1e-9
+    flat = covariance.reshape(len(at_ns), 9)
+    between = np.column_stack([np.interp(wanted_s, known_s, flat[:, entry]) for entry in range(9)])
+    return TrajectorySolved(
+        map_version=UNNUMBERED,
+        vehicle=each.drive.vehicle,
+        boot_id=each.drive.boot_id,
+        stamp_ns=stamp_ns,
+        pose=poses_at(each, drive.pose, stamp_ns),
+        covariance=between.reshape(-1, 3, 3),
+        calibration=_calibration(each, drive),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Sighted:
+    """All detections (n,) that are of a landmark: which drive, which row of it, which landmark, when."""
+
+    drive: Ints
+    row: Ints
+    landmark: Ints
+    stamp_ns: Ints
+
+
+def _sighted(solved: Solved) -> _Sighted:
+    """The associated detections in order of landmark, time and drive."""
+    parts = []
+    for index, (each, track) in enumerate(zip(solved.fleet.prepared, solved.association.track, strict=True)):
+        row = np.nonzero(track >= 0)[0]
+        landmark = solved.association.landmark_of_track[track[row]]
+        parts.append(np.column_stack([np.full(len(row), index), row, landmark, each.drive.detections.stamp_ns[row]]))
+    table = np.concatenate(parts).astype(np.int64)
+    table = table[np.lexsort((table[:, 0], table[:, 3], table[:, 2]))]
+    return _Sighted(drive=table[:, 0], row=table[:, 1], landmark=table[:, 2], stamp_ns=table[:, 3])
+
+
+def _landmarks(solved: Solved, covariance: Floats) -> tuple[LandmarkSolved, ...]:
+    sighted, signatures = _sighted(solved), landmark_signatures(solved)
+    bounds = np.searchsorted(sighted.landmark, np.arange(solved.association.landmark_count + 1))
+    tied = _tied_names(solved)
+    return tuple(
+        _landmark(solved, sighted, slice(bounds[j], bounds[j + 1]), signatures[j], covariance, tied.get(j, ()))
+        for j in range(solved.association.landmark_count)
+    )
+
+
+def _tied_names(solved: Solved) -> dict[int, tuple[str, ...]]:
+    tied: dict[int, tuple[str, ...]] = {}
+    for name, landmark in zip(solved.labels.name, solved.assignment.landmark, strict=True):
+        if landmark >= 0:
+            tied[int(landmark)] = (*tied.get(int(landmark), ()), name)
+    return tied
+
+
+def _landmark(
+    solved: Solved, sighted: _Sighted, own: slice, signature: str, covariance: Floats, anchors: tuple[str, ...]
+) -> LandmarkSolved:
+    j = int(sighted.landmark[own.start])
+    drives = [solved.fleet.prepared[d].drive for d in sighted.drive[own]]
+    rows = sighted.row[own]
+    observations = tuple(
+        dict.fromkeys(
+            (drive.vehicle, drive.boot_id, int(drive.detections.sequence[row]))
+            for drive, row in zip(drives, rows, strict=True)
         )
-        state = solved_state(full_graph(solved), state)
-        fleet = recalibrated(fleet, state)
-        solved = replace(solved, fleet=fleet, state=state)
-        progress("landmarks", (turn + 1) / ASSOCIATION_ROUNDS)
-        renewed = renewed_association(fleet, state, association)
-        if np.array_equal(renewed.landmark_of_track, association.landmark_of_track):
-            break
-        association = renewed
-    return replace(solved, sightings=fleet_sightings(fleet, solved.association))
+    )
+    track = int(solved.association.track[int(sighted.drive[own.start])][rows[0]])
+    return LandmarkSolved(
+        map_version=UNNUMBERED,
+        landmark=signature or _stable_name(drives[0], int(rows[0])),
+        kind=solved.association.kinds[int(solved.association.kind_of_track[track])],
+        signature=signature,
+        position_m=solved.state.landmark_m[j],
+        covariance_m2=covariance[2 * j : 2 * j + 2, 2 * j : 2 * j + 2],
+        observation_count=len(rows),
+        vehicles=tuple(sorted({drive.vehicle for drive in drives})),
+        first_seen_ns=int(sighted.stamp_ns[own.start]),
+        last_seen_ns=int(sighted.stamp_ns[own.stop - 1]),
+        anchors=anchors,
+        observations=observations,
+    )
 
 
-def full_graph(solved: Solved, *, with_labels: bool = True) -> gtsam.NonlinearFactorGraph:
-    """The graph of a solve: odometry, fixes, landmarks, and labels if wanted; kernels on fixes, landmarks, labels."""
-    settings, graph = solved.fleet.settings, georeferenced_graph(solved.fleet, robust=True)
-    landmark = solved.association.landmark_of_track[solved.sightings.track]
-    add_sightings(graph, solved.sightings, landmark, cauchy_scale=settings.detections.cauchy_scale)
-    if with_labels:
-        tied, _ = tied_labels(solved.labels, solved.assignment)
-        add_labels(graph, tied, cauchy_scale=None)
-    return graph
+def _stable_name(drive: Drive, row: int) -> str:
+    """A landmark's name by its first detection: the same in every version that starts from it."""
+    first = np.searchsorted(drive.detections.stamp_ns, drive.detections.stamp_ns[row])
+    text = f"{drive.vehicle}/{drive.boot_id}/{int(drive.detections.sequence[row])}/{row - int(first)}"
+    return "lm-" + blake2b(text.encode(), digest_size=6).hexdigest()
 
 
-def anchored(solved: Solved, labels: Labels, *, progress: Progress) -> Solved:
-    """The fleet with labels tied: first those a joint shift of the map explains, then, solve by solve, the rest.
-
-    Raises AlignmentRefused when there are labels and none finds its landmark.
-    """
-    solved = replace(solved, labels=labels, state=replace(solved.state, image_m=np.zeros((len(labels.images), 2))))
-    assignment = first_assignment(solved)
-    if len(labels.name) and not (assignment.landmark >= 0).any():
-        raise AlignmentRefused(f"none of {len(labels.name)} anchors finds its landmark: {assignment.reason[0]}")
-    for turn in range(solved.fleet.settings.anchors.rounds):
-        solved = replace(solved, assignment=assignment)
-        solved = replace(solved, state=solved_state(full_graph(solved), solved.state))
-        progress("anchors", (turn + 1) / solved.fleet.settings.anchors.rounds)
-        renewed = renewed_assignment(solved)
-        if np.array_equal(renewed.landmark, assignment.landmark):
-            return replace(solved, assignment=renewed)
-        assignment = renewed
-    return solved
-
-
-def landmark_signatures(solved: Solved) -> tuple[str, ...]:
-    """The known identity of each landmark, empty where detections carry none."""
-    found = [""] * solved.association.landmark_count
-    for each, track in zip(solved.fleet.prepared, solved.association.track, strict=True):
-        for row in np.nonzero(track >= 0)[0]:
-            signature = each.drive.detections.signature[row]
-            if signature:
-                found[int(solved.association.landmark_of_track[track[row]])] = signature
-    return tuple(found)
-
-
-def first_assignment(solved: Solved) -> Assignment:
-    """Labels tied before any solve with labels: by signature if they carry one and it is to be used, else by vote."""
-    settings, labels = solved.fleet.settings, solved.labels
-    named = by_signature(labels, landmark_signatures(solved))
-    if (named.landmark >= 0).any():
-        return named
-    return voted_assignment(labels, solved.state.landmark_m, settings=settings.anchors, detections=settings.detections)
-
-
-def renewed_assignment(solved: Solved) -> Assignment:
-    """Labels tied anew after a solve; those whose residual is beyond belief are let go."""
-    settings, labels, state = solved.fleet.settings.anchors, solved.labels, solved.state
-    if any(reason == "signature" for reason in solved.assignment.reason):
-        assignment = by_signature(labels, landmark_signatures(solved))
-    else:
-        sigma = _expected_sigma(solved)
-        shift = np.vstack([state.image_m, np.zeros((1, 2))])[labels.image]
-        assignment = nearest_assignment(labels, state.landmark_m, shift_m=shift, sigma_m=sigma, settings=settings)
+def _anchors(solved: Solved, landmark: Sequence[str]) -> tuple[AnchorAssociated, ...]:
+    state, labels, assignment = solved.state, solved.labels, solved.assignment
     residual = residuals_m(labels, assignment, state.landmark_m, state.image_m)
-    return without_outliers(assignment, residual, _residual_sigma(solved), limit_sigmas=settings.outlier_sigmas)
+    return tuple(
+        AnchorAssociated(
+            map_version=UNNUMBERED,
+            anchor=name,
+            landmark=landmark[found] if found >= 0 else "",
+            reason=assignment.reason[row],
+            residual_m=residual[row],
+        )
+        for row, (name, found) in enumerate(zip(labels.name, assignment.landmark, strict=True))
+    )
 
 
-def _expected_sigma(solved: Solved) -> Floats:
-    """1-sigma per axis (a,) of a label around its landmark as the solve predicts it, untied labels included."""
-    reduction = reduced_landmarks(solved)
-    count = solved.association.landmark_count
-    covariance = np.linalg.inv(reduction.information)
-    variance = np.diag(covariance).reshape(-1, 2).max(axis=1)
-    labels = solved.labels
-    expected = labels.label_m - np.vstack([solved.state.image_m, np.zeros((1, 2))])[labels.image]
-    distance = np.hypot(*(expected[:, None, :] - solved.state.landmark_m[None, :, :]).transpose(2, 0, 1))
-    image = np.append(variance[count:], 0.0)[labels.image]
-    return np.sqrt(variance[:count][distance.argmin(axis=1)] + image + labels.sigma_m**2)
+def _images(solved: Solved) -> tuple[ImageOffsetSolved, ...]:
+    if not solved.labels.images:
+        return ()
+    count = 2 * solved.association.landmark_count
+    covariance = covariance_of(reduced_landmarks(solved))[count:, count:]
+    return tuple(
+        ImageOffsetSolved(
+            map_version=UNNUMBERED,
+            image=name,
+            offset_m=solved.state.image_m[i],
+            covariance_m2=covariance[2 * i : 2 * i + 2, 2 * i : 2 * i + 2],
+        )
+        for i, name in enumerate(solved.labels.images)
+    )
 
 
-def _residual_sigma(solved: Solved) -> Floats:
-    """1-sigma per axis (a,) that a tied label's residual is held against: its own and a landmark's local one."""
-    return np.hypot(solved.labels.sigma_m, solved.fleet.settings.anchors.landmark_sigma_m)
-
-
-def reduced_landmarks(solved: Solved, *, with_labels: bool = True) -> Reduced:
-    """Everything marginalised onto all landmarks, then all image offsets if labels are in."""
-    keys = [landmark_key(j) for j in range(solved.association.landmark_count)]
-    state = solved.state
-    if with_labels:
-        keys += [image_key(i) for i in range(len(state.image_m))]
-    else:
-        state = replace(state, image_m=np.zeros((0, 2)))
-    return reduced(full_graph(solved, with_labels=with_labels), values_of(state), keys)
+def _label_reduction(solved: Solved) -> LabelReduction:
+    labels, assignment = solved.labels, solved.assignment
+    rows = np.nonzero(assignment.landmark >= 0)[0]
+    numbers, index = np.unique(assignment.landmark[rows], return_inverse=True)
+    reduced = reduced_landmarks(solved, kept=numbers, with_labels=False)
+    return LabelReduction(
+        landmarks=tuple(str(number) for number in numbers),
+        point_m=solved.state.landmark_m[numbers],
+        information=reduced.information,
+        gradient=reduced.gradient,
+        labels=tuple(labels.name[row] for row in rows),
+        landmark_index=index.astype(np.int64),
+        label_m=labels.label_m[rows],
+        sigma_m=labels.sigma_m[rows],
+        image_index=labels.image[rows],
+        images=labels.images,
+        image_sigma_m=labels.image_sigma_m,
+    )

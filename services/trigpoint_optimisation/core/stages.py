@@ -1,0 +1,209 @@
+"""The whole solve: odometry and fixes, then landmarks, then anchors; each stage starts from the converged one before."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import gtsam
+import numpy as np
+from numpy.typing import NDArray
+
+from trigpoint.errors import AlignmentRefused
+from trigpoint.events.corrected import AnchorLabelled
+from trigpoint.events.drives import Drive
+from trigpoint.geodesy.projection import MapFrame
+from trigpoint_optimisation.core.anchoring import (
+    Assignment,
+    Labels,
+    by_signature,
+    labels_of,
+    nearest_assignment,
+    residuals_m,
+    tied_labels,
+    voted_assignment,
+    without_outliers,
+)
+from trigpoint_optimisation.core.association import (
+    Association,
+    first_association,
+    fleet_sightings,
+    landmark_means,
+    renewed_association,
+    tracks_in_map,
+)
+from trigpoint_optimisation.core.fleet import Fleet, Progress, georeferenced_graph, prepared_fleet, recalibrated, solved_state
+from trigpoint_optimisation.core.georeferencing import georeferenced
+from trigpoint_optimisation.core.graph import add_labels, add_sightings
+from trigpoint_optimisation.core.marginals import Reduced, covariance_of, reduced
+from trigpoint_optimisation.core.sightings import Sightings
+from trigpoint_optimisation.core.state import MapState, image_key, landmark_key, values_of
+from trigpoint_optimisation.settings import SolveSettings
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+ASSOCIATION_ROUNDS = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Solved:
+    """A solved fleet: its state, which detection is of which landmark, which label of which, and the sightings."""
+
+    fleet: Fleet
+    state: MapState
+    association: Association
+    sightings: Sightings
+    labels: Labels
+    assignment: Assignment
+
+
+def quiet(stage: str, part: float) -> None:
+    """A progress listener that does nothing."""
+
+
+def solve_fleet(
+    drives: Sequence[Drive],
+    anchors: Sequence[AnchorLabelled],
+    frame: MapFrame,
+    settings: SolveSettings,
+    *,
+    allowed: Sequence[Bools] | None = None,
+    progress: Progress = quiet,
+) -> Solved:
+    """The fleet solved by the settings' method; `allowed` (f,) per drive says which fixes may be used.
+
+    Raises AlignmentRefused when the data leave a drive's place undetermined.
+    """
+    masks = allowed if allowed is not None else [np.ones(len(drive.fixes.stamp_ns), dtype=bool) for drive in drives]
+    fleet = prepared_fleet(drives, frame, settings, allowed=masks)
+    fleet, state = georeferenced(fleet, progress=progress)
+    solved = _with_landmarks(fleet, state, progress)
+    if settings.method == "anchored":
+        solved = anchored(solved, labels_of(anchors, frame, image_offsets=settings.image_offsets), progress=progress)
+    return solved
+
+
+def no_labels() -> tuple[Labels, Assignment]:
+    """No labels and nothing assigned."""
+    none = np.zeros(0, dtype=np.int64)
+    labels = Labels(
+        name=(), label_m=np.zeros((0, 2)), sigma_m=np.zeros(0), image=none, kind=(), signature=(), images=(), image_sigma_m=np.zeros(0)
+    )
+    return labels, Assignment(landmark=none, reason=())
+
+
+def _with_landmarks(fleet: Fleet, state: MapState, progress: Progress) -> Solved:
+    """Landmarks associated and solved for, in rounds: each solve makes the next association surer."""
+    association = first_association(fleet, state)
+    labels, assignment = no_labels()
+    for turn in range(ASSOCIATION_ROUNDS):
+        tracks = tracks_in_map(fleet, state, association)
+        state = replace(state, landmark_m=landmark_means(tracks, association.landmark_of_track))
+        sightings = fleet_sightings(fleet, association)
+        solved = Solved(
+            fleet=fleet, state=state, association=association, sightings=sightings, labels=labels, assignment=assignment
+        )
+        state = solved_state(full_graph(solved), state)
+        fleet = recalibrated(fleet, state)
+        solved = replace(solved, fleet=fleet, state=state)
+        progress("landmarks", (turn + 1) / ASSOCIATION_ROUNDS)
+        renewed = renewed_association(fleet, state, association)
+        if np.array_equal(renewed.landmark_of_track, association.landmark_of_track):
+            break
+        association = renewed
+    return replace(solved, sightings=fleet_sightings(fleet, solved.association))
+
+
+def full_graph(solved: Solved, *, with_labels: bool = True) -> gtsam.NonlinearFactorGraph:
+    """The graph of a solve: odometry, fixes, landmarks, and labels if wanted; kernels on fixes, landmarks, labels."""
+    settings, graph = solved.fleet.settings, georeferenced_graph(solved.fleet, robust=True)
+    landmark = solved.association.landmark_of_track[solved.sightings.track]
+    add_sightings(graph, solved.sightings, landmark, cauchy_scale=settings.detections.cauchy_scale)
+    if with_labels:
+        tied, _ = tied_labels(solved.labels, solved.assignment)
+        add_labels(graph, tied, cauchy_scale=None)
+    return graph
+
+
+def anchored(solved: Solved, labels: Labels, *, progress: Progress) -> Solved:
+    """The fleet with labels tied: first those a joint shift of the map explains, then, solve by solve, the rest.
+
+    Raises AlignmentRefused when there are labels and none finds its landmark.
+    """
+    solved = replace(solved, labels=labels, state=replace(solved.state, image_m=np.zeros((len(labels.images), 2))))
+    assignment = first_assignment(solved)
+    if len(labels.name) and not (assignment.landmark >= 0).any():
+        raise AlignmentRefused(f"none of {len(labels.name)} anchors finds its landmark: {assignment.reason[0]}")
+    for turn in range(solved.fleet.settings.anchors.rounds):
+        solved = replace(solved, assignment=assignment)
+        solved = replace(solved, state=solved_state(full_graph(solved), solved.state))
+        progress("anchors", (turn + 1) / solved.fleet.settings.anchors.rounds)
+        renewed = renewed_assignment(solved)
+        if np.array_equal(renewed.landmark, assignment.landmark):
+            return replace(solved, assignment=renewed)
+        assignment = renewed
+    return solved
+
+
+def landmark_signatures(solved: Solved) -> tuple[str, ...]:
+    """The known identity of each landmark, empty where detections carry none."""
+    found = [""] * solved.association.landmark_count
+    for each, track in zip(solved.fleet.prepared, solved.association.track, strict=True):
+        for row in np.nonzero(track >= 0)[0]:
+            signature = each.drive.detections.signature[row]
+            if signature:
+                found[int(solved.association.landmark_of_track[track[row]])] = signature
+    return tuple(found)
+
+
+def first_assignment(solved: Solved) -> Assignment:
+    """Labels tied before any solve with labels: by signature if they carry one and it is to be used, else by vote."""
+    settings, labels = solved.fleet.settings, solved.labels
+    named = by_signature(labels, landmark_signatures(solved))
+    if (named.landmark >= 0).any():
+        return named
+    return voted_assignment(labels, solved.state.landmark_m, settings=settings.anchors, detections=settings.detections)
+
+
+def renewed_assignment(solved: Solved) -> Assignment:
+    """Labels tied anew after a solve; those whose residual is beyond belief are let go."""
+    settings, labels, state = solved.fleet.settings.anchors, solved.labels, solved.state
+    if any(reason == "signature" for reason in solved.assignment.reason):
+        assignment = by_signature(labels, landmark_signatures(solved))
+    else:
+        sigma = _expected_sigma(solved)
+        shift = np.vstack([state.image_m, np.zeros((1, 2))])[labels.image]
+        assignment = nearest_assignment(labels, state.landmark_m, shift_m=shift, sigma_m=sigma, settings=settings)
+    residual = residuals_m(labels, assignment, state.landmark_m, state.image_m)
+    return without_outliers(assignment, residual, _residual_sigma(solved), limit_sigmas=settings.outlier_sigmas)
+
+
+def _expected_sigma(solved: Solved) -> Floats:
+    """1-sigma per axis (a,) of a label around its landmark as the solve predicts it, untied labels included."""
+    reduction = reduced_landmarks(solved)
+    count = solved.association.landmark_count
+    covariance = covariance_of(reduction)
+    variance = np.diag(covariance).reshape(-1, 2).max(axis=1)
+    labels = solved.labels
+    expected = labels.label_m - np.vstack([solved.state.image_m, np.zeros((1, 2))])[labels.image]
+    distance = np.hypot(*(expected[:, None, :] - solved.state.landmark_m[None, :, :]).transpose(2, 0, 1))
+    image = np.append(variance[count:], 0.0)[labels.image]
+    return np.sqrt(variance[:count][distance.argmin(axis=1)] + image + labels.sigma_m**2)
+
+
+def _residual_sigma(solved: Solved) -> Floats:
+    """1-sigma per axis (a,) that a tied label's residual is held against: its own and a landmark's local one."""
+    return np.hypot(solved.labels.sigma_m, solved.fleet.settings.anchors.landmark_sigma_m)
+
+
+def reduced_landmarks(solved: Solved, *, kept: Ints | None = None, with_labels: bool = True) -> Reduced:
+    """Everything marginalised onto the kept landmarks (all by default), then all image offsets if labels are in."""
+    numbers = np.arange(solved.association.landmark_count) if kept is None else kept
+    keys = [landmark_key(int(j)) for j in numbers]
+    state = solved.state
+    if with_labels:
+        keys += [image_key(i) for i in range(len(state.image_m))]
+    else:
+        state = replace(state, image_m=np.zeros((0, 2)))
+    return reduced(full_graph(solved, with_labels=with_labels), values_of(state), keys)

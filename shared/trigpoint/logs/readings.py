@@ -1,0 +1,85 @@
+"""What a log holds, folded into the values services work on: frame, drives, anchors, verdicts, map versions."""
+
+from collections.abc import Callable
+from typing import cast
+
+from trigpoint.errors import InputError
+from trigpoint.events.corrected import AnchorLabelled, anchors_in_force
+from trigpoint.events.drives import Drive, drives_of
+from trigpoint.events.envelope import Envelope
+from trigpoint.events.estimated import FixJudged
+from trigpoint.events.keys import STREAM_PATTERNS
+from trigpoint.events.mapped import Mapped, MapSolved
+from trigpoint.events.observed import MapFramePinned, Observed, VehicleDescribed
+from trigpoint.events.solved import SolvedMap, solved_maps
+from trigpoint.geodesy.positions import GridPosition
+from trigpoint.geodesy.projection import MapFrame, pin_map_frame
+from trigpoint.logs.ports import EventLog
+
+Progress = Callable[[int, int], None]
+
+VEHICLE_PREFIX = STREAM_PATTERNS[VehicleDescribed].partition("{")[0]
+FRAME_STREAM, MAPPED_STREAM = STREAM_PATTERNS[MapFramePinned], STREAM_PATTERNS[MapSolved]
+LABEL_STREAM, VERDICT_STREAM = STREAM_PATTERNS[AnchorLabelled], STREAM_PATTERNS[FixJudged]
+PROGRESS_COUNT = 5000  # events between two calls
+
+
+def in_silence(done: int, total: int) -> None:
+    """Progress for nobody."""
+
+
+def pinned_frame(log: EventLog) -> MapFrame | None:
+    """The map's frame, None before it was pinned."""
+    for row in log.read(FRAME_STREAM, kinds=(MapFramePinned,)):
+        event = cast(MapFramePinned, row.envelope.event)
+        return pin_map_frame(crs=event.crs, origin=GridPosition(event.origin_easting_m, event.origin_northing_m))
+    return None
+
+
+def logged_frame(log: EventLog) -> MapFrame:
+    """The map's pinned frame. Raises InputError where nothing has pinned one."""
+    frame = pinned_frame(log)
+    if frame is None:
+        raise InputError("the log pins no map frame: it has no GNSS fix, no declared origin and no anchor")
+    return frame
+
+
+def vehicle_streams(log: EventLog) -> tuple[str, ...]:
+    """The streams of vehicles' observations, sorted."""
+    return tuple(stream for stream in log.streams() if stream.startswith(VEHICLE_PREFIX))
+
+
+def logged_drives(log: EventLog, *, progress: Progress = in_silence) -> tuple[Drive, ...]:
+    """Every drive in the log. Raises InputError where there is none."""
+    streams = vehicle_streams(log)
+    total = sum(log.next_number(stream) for stream in streams)
+    rows: list[Envelope[Observed]] = []
+    for stream in streams:
+        for logged in log.read(stream):
+            rows.append(cast(Envelope[Observed], logged.envelope))
+            if len(rows) % PROGRESS_COUNT == 0:
+                progress(len(rows), total)
+    if not rows:
+        raise InputError("the log holds no vehicle's events: nothing was ingested yet")
+    progress(total, total)
+    return drives_of(rows)
+
+
+def logged_anchors(log: EventLog) -> tuple[AnchorLabelled, ...]:
+    """The anchors in force: of several labels of one name in one image the last."""
+    rows = log.read(LABEL_STREAM, kinds=(AnchorLabelled,))
+    return anchors_in_force(cast(AnchorLabelled, row.envelope.event) for row in rows)
+
+
+def logged_verdicts(log: EventLog) -> tuple[FixJudged, ...]:
+    """The filter's verdicts; of a fix judged twice the last one counts."""
+    last: dict[tuple[str, str, int], FixJudged] = {}
+    for row in log.read(VERDICT_STREAM, kinds=(FixJudged,)):
+        verdict = cast(FixJudged, row.envelope.event)
+        last[verdict.vehicle, verdict.boot_id, verdict.fix_sequence] = verdict
+    return tuple(last.values())
+
+
+def logged_maps(log: EventLog) -> tuple[SolvedMap, ...]:
+    """Every complete map version, oldest first."""
+    return solved_maps(cast(Mapped, row.envelope.event) for row in log.read(MAPPED_STREAM))
