@@ -10,7 +10,15 @@ from sqlalchemy import Connection, Table, delete, insert, select, text
 from trigpoint.errors import InputError
 from trigpoint.landmarks import geopackage_schema as schema
 from trigpoint.landmarks import records, tables
-from trigpoint.landmarks.geopackage_file import close, database_errors, driver_of, insert_reference, opened, transaction
+from trigpoint.landmarks.geopackage_file import (
+    close,
+    database_errors,
+    driver_of,
+    indexed_at_once,
+    insert_reference,
+    opened,
+    transaction,
+)
 from trigpoint.landmarks.geopackage_query import (
     LANDMARK_TABLES,
     WIDEST_INDEXED_DEG,
@@ -166,13 +174,14 @@ class GeoPackageStore:
         self._insert(tables.image_offsets, [records.plain_record(row) for row in change.image_offsets])
 
     def _open_landmarks(self, change: MapChange, srs_id: int) -> None:
+        driver = driver_of(self._connection)
         values = (record_of(landmark, srs_id=srs_id) for landmark in change.opened)
         try:
-            driver_of(self._connection).executemany(INSERT_SQL, values)
+            with indexed_at_once(driver, "landmarks"):
+                driver.executemany(INSERT_SQL, values)
         except sqlite3.IntegrityError as error:
-            raise InputError(
-                f"map version {change.version.map_version} opens a landmark still valid: {error}"
-            ) from error
+            reason = f"map version {change.version.map_version} opens a landmark still valid: {error}"
+            raise InputError(reason) from error
 
     def _insert(self, target: Table, rows: Sequence[Record]) -> None:
         if rows:
@@ -181,11 +190,12 @@ class GeoPackageStore:
     def _close_landmarks(self, landmarks: Sequence[str], map_version: int) -> None:
         columns = ", ".join(name for name in COLUMNS if name != "valid_to_version")
         driver = driver_of(self._connection)
-        moved = driver.executemany(
-            f"INSERT INTO landmark_history ({columns}, valid_to_version) "
-            f"SELECT {columns}, ? FROM landmarks WHERE landmark = ?",
-            [(map_version, landmark) for landmark in landmarks],
-        ).rowcount
+        with indexed_at_once(driver, "landmark_history"):
+            moved = driver.executemany(
+                f"INSERT INTO landmark_history ({columns}, valid_to_version) "
+                f"SELECT {columns}, ? FROM landmarks WHERE landmark = ?",
+                [(map_version, landmark) for landmark in landmarks],
+            ).rowcount
         if landmarks and moved != len(landmarks):
             raise InputError(f"map version {map_version} closes {len(landmarks)} landmarks: {moved} are valid")
         driver.executemany("DELETE FROM landmarks WHERE landmark = ?", [(landmark,) for landmark in landmarks])

@@ -91,7 +91,7 @@ def test_a_box_of_20_landmarks_costs_at_most_5_times_its_bare_sql(filled: Filled
     assert store_s < 5.0 * bare_s
 
 
-def test_100_000_landmarks_are_applied_in_at_most_8_times_the_bare_index(filled: Filled) -> None:
+def test_100_000_landmarks_are_applied_in_at_most_6_times_the_bare_index(filled: Filled) -> None:
     bare = sqlite3.connect(":memory:")
     bare.execute("CREATE TABLE t (fid INTEGER PRIMARY KEY, landmark TEXT UNIQUE, x_m REAL, y_m REAL, provenance TEXT)")
     bare.execute("CREATE VIRTUAL TABLE r USING rtree(id, minx, maxx, miny, maxy)")
@@ -101,5 +101,5 @@ def test_100_000_landmarks_are_applied_in_at_most_8_times_the_bare_index(filled:
     bare_s += timed_s(lambda: bare.executemany("INSERT INTO r VALUES (?, ?, ?, ?, ?)", corners))
     bare.close()
     said(f"{LANDMARK_COUNT} landmarks applied in {filled.wall_s:.1f} s, bare in memory {bare_s:.1f} s")
-    # It also writes 24 columns instead of 5, to disk, and asks Python for each geometry's bounds: some 4 times.
-    assert filled.wall_s < 8.0 * bare_s
+    # It also writes 24 columns instead of 5, to disk, and asks Python for each geometry's bounds: 2.5 times.
+    assert filled.wall_s < 6.0 * bare_s
