@@ -14,6 +14,7 @@ from trigpoint_filtering.core.motion import (
     BIAS_X,
     BIAS_Y,
     HEADING,
+    SPEED_SCALE,
     STATE_SIZE,
     TURN_BIAS,
     Geometry,
@@ -29,6 +30,7 @@ Floats = NDArray[np.float64]
 
 CORRELATION_FLOOR = 1e-9  # least eigenvalue of the correlation matrix: safely above double rounding
 VARIANCE_FLOOR = 1e-14
+POSE_COVARIANCE_FLOOR = 1e-9  # m^2 and rad^2: 0.03 mm and 0.03 mrad
 VARIANCE_CAP = np.array([1e10, 1e10, 1.0, 0.25, 0.25, 0.25, 25.0, 25.0, 1e4, 1e4])  # past these nothing is known
 
 
@@ -148,3 +150,10 @@ def sound_covariance(covariance: Floats) -> Floats:
     correlation = floored_covariance(covariance * np.outer(scale, scale), floor=CORRELATION_FLOOR)
     sigma = np.sqrt(np.minimum(variance, VARIANCE_CAP))
     return correlation * np.outer(sigma, sigma)
+
+
+def pose_covariance(belief: Belief) -> Floats:
+    """The covariance (3, 3) of x, y in m and heading in rad, positive definite by a margin."""
+    part = belief.covariance[:SPEED_SCALE, :SPEED_SCALE]
+    margin = part.diagonal().min() * CORRELATION_FLOOR
+    return floored_covariance(part, floor=max(float(margin), POSE_COVARIANCE_FLOOR))

@@ -175,8 +175,8 @@ def placed(calibration: Belief, T_map_base: Pose2, alignment: Alignment, noise: 
     white_m2 = max(noise.white_sigma_m, alignment.scatter_m) ** 2
     covariance[X, X] = covariance[Y, Y] = noise.bias_sigma_m**2 + white_m2 + lever_m2
     covariance[BIAS_X, BIAS_X] = covariance[BIAS_Y, BIAS_Y] = noise.bias_sigma_m**2
-    covariance[X, BIAS_X] = covariance[BIAS_X, X] = covariance[Y, BIAS_Y] = covariance[BIAS_Y, Y] = (
-        -(noise.bias_sigma_m**2)
+    covariance[X, BIAS_X] = covariance[BIAS_X, X] = covariance[Y, BIAS_Y] = covariance[BIAS_Y, Y] = -(
+        noise.bias_sigma_m**2
     )
     covariance[HEADING, HEADING] = alignment.heading_sigma_rad**2
     return Belief(mean, sound_covariance(covariance))

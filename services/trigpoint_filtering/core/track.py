@@ -1,8 +1,7 @@
 """A whole drive filtered: the online fold run over its series in order of time."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,24 +11,15 @@ from trigpoint.events.estimated import FixJudged, GateAlarmed
 from trigpoint.geodesy.poses import wrap_angles_rad
 from trigpoint.geodesy.positions import MapPosition
 from trigpoint.geodesy.projection import MapFrame, map_points_from_wgs84
-from trigpoint.geodesy.uncertainty import floored_covariance
-from trigpoint_filtering.core.estimator import Belief
+from trigpoint_filtering.core.estimator import Belief, pose_covariance
+from trigpoint_filtering.core.following import Track, base_speed_mps, started_track
 from trigpoint_filtering.core.motion import ANTENNA_X, ANTENNA_Y, HEADING, SPEED_SCALE, STATE_SIZE, X
 from trigpoint_filtering.core.odometer import Odometer, after_imu_sample, after_wheel_sample
-from trigpoint_filtering.core.online import (
-    Track,
-    after_fix,
-    base_speed_mps,
-    is_step_due,
-    started_track,
-    with_odometer,
-)
+from trigpoint_filtering.core.online import after_fix, is_step_due, with_odometer
 from trigpoint_filtering.settings import FilterSettings
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-POSE_COVARIANCE_FLOOR = 1e-9  # m^2 and rad^2: 0.03 mm and 0.03 mrad
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,51 +55,55 @@ class FilteredDrive:
     refusal: str
 
 
-class Progress(Protocol):
-    """Told how much of the work is done."""
-
-    def __call__(self, done: int, total: int) -> None:
-        """`done` of `total` samples have been taken."""
-
-
-PROGRESS_EVERY = 1000  # samples
+Progress = Callable[[int, int], None]  # samples taken, of how many
 
 
 def filter_drive(
     drive: Drive, frame: MapFrame, settings: FilterSettings, *, progress: Progress | None = None
 ) -> FilteredDrive:
     """A drive filtered causally; without poses and with the reason where position or heading cannot be found."""
-    track = started_track(drive.described, boot_id=drive.boot_id, point_scale=frame.point_scale, settings=settings)
     recording = _Recording()
-    total = len(drive.wheels.stamp_ns) + len(drive.imu.stamp_ns) + len(drive.fixes.stamp_ns)
-    for done, track in _tracks(track, drive, frame):
+    track = begun_track(drive, frame, settings)
+    for track in tracks(drive, frame, settings, progress=progress):
         recording.take(track)
-        if progress is not None and done % PROGRESS_EVERY == 0:
-            progress(done, total)
     return recording.filtered(track)
 
 
-def _tracks(track: Track, drive: Drive, frame: MapFrame) -> Iterator[tuple[int, Track]]:
-    """The track whenever it took a step or a fix, with the number of samples gone into it.
+def begun_track(drive: Drive, frame: MapFrame, settings: FilterSettings) -> Track:
+    """The track of a drive before its first sample."""
+    return started_track(drive.described, boot_id=drive.boot_id, point_scale=frame.point_scale, settings=settings)
 
-    The same functions as in the online fold; the samples between are folded into the odometer alone.
+
+def tracks(
+    drive: Drive, frame: MapFrame, settings: FilterSettings, *, progress: Progress | None = None
+) -> Iterator[Track]:
+    """The track of a drive whenever it has taken a step or a fix, and at last.
+
+    The same functions as in the online fold; samples between steps are folded into the odometer alone.
     """
-    odometer, samples = track.odometer, (_wheel_rows(drive), _imu_rows(drive), _fix_rows(drive, frame))
-    for done, kind in enumerate(_kinds_in_order(drive)):
+    track = begun_track(drive, frame, settings)
+    odometer = track.odometer
+    samples = (_wheel_rows(drive), _imu_rows(drive), _fix_rows(drive, frame))
+    kinds = _kinds_in_order(drive)
+    for done, kind in enumerate(kinds, start=1):
+        row = next(samples[kind])
         if kind == FIXES:
-            x_m, y_m, stamp_ns, sigma_m, sequence = next(samples[FIXES])
-            before = replace(track, odometer=odometer)
-            track = after_fix(
-                before, MapPosition(x_m, y_m), stamp_ns=int(stamp_ns), sigma_m=sigma_m, sequence=int(sequence)
-            )
-            odometer = track.odometer
-            yield done, track
-            continue
-        odometer = _with_sample(odometer, kind, next(samples[kind]))
-        if is_step_due(track.following, odometer):
+            track = _with_fix(replace(track, odometer=odometer), row)
+        else:
+            odometer = _with_sample(odometer, kind, row)
+            if not is_step_due(track.following, odometer):
+                continue
             track = with_odometer(track, odometer)
-            odometer = track.odometer
-            yield done, track
+        odometer = track.odometer
+        yield track
+        if progress is not None and (kind == FIXES or done == len(kinds)):
+            progress(done, len(kinds))
+
+
+def _with_fix(track: Track, row: tuple[float, ...]) -> Track:
+    x_m, y_m, stamp_ns, sigma_m, sequence = row
+    position = MapPosition(x_m, y_m)
+    return after_fix(track, position, stamp_ns=int(stamp_ns), sigma_m=sigma_m, sequence=int(sequence))
 
 
 WHEELS, IMU, FIXES = range(3)
@@ -172,7 +166,7 @@ class _Recording:
             self.judged.append(track.verdict)
         if track.alarm is not None:
             self.alarms.append(track.alarm)
-            self.alarm_stamp_ns.append(track.believed_ns)
+            self.alarm_stamp_ns.append(track.fix_ns)
         if track.hypothesis is not None and track.hypothesis.belief is not self.newest:
             self._take_belief(track, track.hypothesis.belief)
 
@@ -183,7 +177,7 @@ class _Recording:
                 column.pop()
         self.stamp_ns.append(track.believed_ns)
         self.mean.append(belief.mean)
-        self.covariance.append(belief.covariance[:SPEED_SCALE, :SPEED_SCALE])
+        self.covariance.append(pose_covariance(belief))
         self.speed_mps.append(base_speed_mps(track))
 
     def filtered(self, track: Track) -> FilteredDrive:
@@ -195,7 +189,7 @@ class _Recording:
             boot_id=track.following.boot_id,
             stamp_ns=np.array(self.stamp_ns, dtype=np.int64),
             pose=pose,
-            covariance=np.array([pose_covariance(part) for part in self.covariance]).reshape(-1, 3, 3),
+            covariance=np.array(self.covariance).reshape(-1, 3, 3),
             speed_mps=np.array(self.speed_mps),
             antenna_m=mean[:, ANTENNA_X : ANTENNA_Y + 1],
             judged=tuple(self.judged),
@@ -211,8 +205,3 @@ def _calibration(belief: Belief | None) -> Calibration:
         return Calibration(mean=np.full(5, np.nan), sigma=np.full(5, np.nan))
     part = slice(SPEED_SCALE, ANTENNA_Y + 1)
     return Calibration(mean=belief.mean[part], sigma=np.sqrt(belief.covariance.diagonal()[part]))
-
-
-def pose_covariance(covariance: Floats) -> Floats:
-    """The covariance (3, 3) of x, y in m and heading in rad, positive definite by a margin."""
-    return floored_covariance(covariance, floor=POSE_COVARIANCE_FLOOR)

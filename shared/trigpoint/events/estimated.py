@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 class FixJudged:
     """The filter's verdict on one fix. `nis` is the normalised innovation squared (2 degrees of freedom),
     `limit` the gate it was held against, `reason` one of "inside gate", "outside gate", "outage",
-    "re-acquired", "initialised"; `fix_sequence` the fix's sequence in its vehicle's boot.
+    "re-acquired", "initialised", and, where no gate was asked (`nis` and innovation NaN), "not initialised",
+    "late"; `fix_sequence` the fix's sequence in its vehicle's boot.
     """
 
     vehicle: str
