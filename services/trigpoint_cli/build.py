@@ -60,7 +60,7 @@ def _drives_values(solved: SolvedMap, vehicle: str) -> list[JsonObject]:
 
 def built_answer(built: Built) -> Answer:
     """What a build says."""
-    solved, projection = built.solution.map, built.projection
+    solved, projection = built.solved, built.projection
     refused = tuple(f"map version {version} is not in the database: {reason}" for version, reason in projection.refused)
     values = map_values(solved) | {"applied": list(projection.applied)}
     residual = values["anchor_residual_m"]

@@ -58,7 +58,7 @@ def command(out: Path, seed: int, vehicles: int, *, screen: Screen) -> Answer:
 
 
 def _answer(driven: _Driven, found: TruthEvaluation) -> Answer:
-    solved = driven.built.solution.map
+    solved = driven.built.solved
     values = map_values(solved) | {"ingest": ingest_values(driven.ingest), "report": str(driven.data.report)}
     measured = truth_values(found)
     values |= {name: value for name, value in measured.items() if name not in ("landmarks", "vehicles")}

@@ -3,21 +3,22 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from trigpoint_filtering.app import filter_log
-from trigpoint_optimisation.app import build
-
 from trigpoint.errors import InputError
 from trigpoint.events.corrected import AnchorLabelled
 from trigpoint.events.drives import Drive
 from trigpoint.events.estimated import FixJudged
+from trigpoint.events.solved import SolvedMap
 from trigpoint.geodesy.projection import MapFrame
 from trigpoint.logs.ports import EventLog
+from trigpoint.logs.readings import logged_anchors, logged_drives, logged_frame
 from trigpoint_cli.data_dir import DataDirectory
 from trigpoint_cli.output import Screen
-from trigpoint_evaluation.app import logged_anchors, logged_drives, logged_frame
+from trigpoint_evaluation.app import logged_map
+from trigpoint_filtering.app import filter_log
 from trigpoint_filtering.core.track import FilteredDrive, filter_drive
 from trigpoint_filtering.settings import FilterSettings
 from trigpoint_landmarks.app import ProjectionReport, project
+from trigpoint_optimisation.app import build
 from trigpoint_optimisation.core.solve import Solution, solve_map
 from trigpoint_optimisation.settings import Edges, Method, SolveSettings
 
@@ -33,9 +34,10 @@ class Inputs:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Built:
-    """A new map version: the solution, and what the landmark database made of it."""
+    """A new map version: as solved, as the log has it, and what the landmark database made of it."""
 
     solution: Solution
+    solved: SolvedMap
     projection: ProjectionReport
 
 
@@ -92,7 +94,8 @@ def build_map(
         filter_log(log, FilterSettings(), progress=filtering)
     with screen.stages("solving") as solving:
         solution = build(log, settings, progress=solving)
-    return Built(solution=solution, projection=project_map(data, log, screen))
+    projection = project_map(data, log, screen)
+    return Built(solution=solution, solved=logged_map(log), projection=projection)
 
 
 def project_map(data: DataDirectory, log: EventLog, screen: Screen) -> ProjectionReport:

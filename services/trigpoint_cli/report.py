@@ -6,9 +6,11 @@ from pathlib import Path
 from platform import python_version
 
 import click
+import numpy as np
+from numpy.typing import NDArray
 
 from trigpoint.errors import InputError
-from trigpoint.events.solved import LabelReduction
+from trigpoint.events.solved import LabelReduction, SolvedMap
 from trigpoint.logs.ports import EventLog
 from trigpoint_cli.data_dir import DataDirectory, data_option
 from trigpoint_cli.output import Answer, Screen, answering
@@ -69,7 +71,10 @@ def write_report(
         settings = settings_for("anchored", inputs.anchors)
         solution = solve(inputs, settings, screen, verdicts=estimates.verdicts, what="solving for held-out anchors")
     evaluated = Evaluated(solved=solved, frame=inputs.frame, drives=inputs.drives, verdicts=estimates.verdicts)
-    truth = None if truth_path is None else evaluate_truth(evaluated, read_truth(truth_path))
+    joint_m2 = None if solution is None else _joint_covariance_m2(solution, solved)
+    truth = None
+    if truth_path is not None:
+        truth = evaluate_truth(evaluated, read_truth(truth_path), joint_covariance_m2=joint_m2)
     content = ReportContent(
         evaluated=evaluated,
         anchors=inputs.anchors,
@@ -83,6 +88,12 @@ def write_report(
     with screen.part_of("writing the report") as progress:
         _write(data.report, report_page(content, progress=progress))
     return truth
+
+
+def _joint_covariance_m2(solution: Solution, solved: SolvedMap) -> NDArray[np.float64] | None:
+    """All landmarks' covariance together, if the solution is of the same landmarks as the map version."""
+    names = [one.landmark for one in solution.map.landmarks]
+    return solution.landmark_covariance if names == [one.landmark for one in solved.landmarks] else None
 
 
 def _version(name: str) -> str:

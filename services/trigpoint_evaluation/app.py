@@ -1,6 +1,6 @@
 """Reads what a log holds of drives, anchors and map versions, and measures it against truth."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
@@ -9,18 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trigpoint.errors import InputError
-from trigpoint.events.corrected import AnchorLabelled
-from trigpoint.events.drives import Drive, drives_of
-from trigpoint.events.envelope import Envelope
+from trigpoint.events.drives import Drive
 from trigpoint.events.estimated import Estimated, FixJudged, GateAlarmed, PoseFiltered
 from trigpoint.events.keys import STREAM_PATTERNS
-from trigpoint.events.mapped import Mapped, MapSolved
-from trigpoint.events.observed import EventRefused, MapFramePinned, Observed, VehicleDescribed
-from trigpoint.events.solved import SolvedMap, solved_maps
+from trigpoint.events.observed import EventRefused
+from trigpoint.events.solved import SolvedMap
 from trigpoint.events.truth import Truth, truth_from_lines
-from trigpoint.geodesy.positions import GridPosition
-from trigpoint.geodesy.projection import MapFrame, map_points_from_wgs84, pin_map_frame
+from trigpoint.geodesy.projection import MapFrame, map_points_from_wgs84
 from trigpoint.logs.ports import EventLog
+from trigpoint.logs.readings import logged_maps
 from trigpoint_evaluation.core.consistency import GateTruth, JudgedFixes, gate_truth, judged_fixes
 from trigpoint_evaluation.core.landmark_truth import (
     MATCH_LIMIT_M,
@@ -31,13 +28,8 @@ from trigpoint_evaluation.core.landmark_truth import (
 from trigpoint_evaluation.core.path_truth import PathTruthEvaluation, evaluate_paths
 
 Floats = NDArray[np.float64]
-Progress = Callable[[int, int], None]
 
-VEHICLE_PREFIX = STREAM_PATTERNS[VehicleDescribed].partition("{")[0]
-MAP_STREAM, MAPPED_STREAM = STREAM_PATTERNS[MapFramePinned], STREAM_PATTERNS[MapSolved]
-LABEL_STREAM, REFUSED_STREAM = STREAM_PATTERNS[AnchorLabelled], STREAM_PATTERNS[EventRefused]
-ESTIMATED_STREAM = STREAM_PATTERNS[FixJudged]
-PROGRESS_COUNT = 5000  # events between two calls
+ESTIMATED_STREAM, REFUSED_STREAM = STREAM_PATTERNS[FixJudged], STREAM_PATTERNS[EventRefused]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,47 +67,6 @@ class TruthEvaluation:
     paths: PathTruthEvaluation
     vehicles: tuple[PathTruthEvaluation, ...]
     gate: GateTruth
-
-
-def no_progress(done: int, total: int) -> None:
-    """Hears of progress, and does nothing."""
-
-
-def logged_frame(log: EventLog) -> MapFrame:
-    """The map's pinned frame. Raises InputError where nothing has pinned one."""
-    for row in log.read(MAP_STREAM, kinds=(MapFramePinned,)):
-        event = row.envelope.event
-        if isinstance(event, MapFramePinned):
-            return pin_map_frame(crs=event.crs, origin=GridPosition(event.origin_easting_m, event.origin_northing_m))
-    raise InputError("the log pins no map frame: it has no GNSS fix, no declared origin and no anchor")
-
-
-def logged_drives(log: EventLog, *, progress: Progress = no_progress) -> tuple[Drive, ...]:
-    """Every drive in the log. Raises InputError where there is none."""
-    streams = [stream for stream in log.streams() if stream.startswith(VEHICLE_PREFIX)]
-    total = sum(log.next_number(stream) for stream in streams)
-    rows: list[Envelope[Observed]] = []
-    for stream in streams:
-        for logged in log.read(stream):
-            rows.append(cast(Envelope[Observed], logged.envelope))
-            if len(rows) % PROGRESS_COUNT == 0:
-                progress(len(rows), total)
-    if not rows:
-        raise InputError("the log holds no vehicle's events: nothing was ingested yet")
-    progress(total, total)
-    return drives_of(rows)
-
-
-def logged_anchors(log: EventLog) -> tuple[AnchorLabelled, ...]:
-    """The anchors in force: of several labels of one name in one image the last."""
-    events = [row.envelope.event for row in log.read(LABEL_STREAM, kinds=(AnchorLabelled,))]
-    in_force = {(event.anchor, event.image): event for event in events if isinstance(event, AnchorLabelled)}
-    return tuple(in_force.values())
-
-
-def logged_maps(log: EventLog) -> tuple[SolvedMap, ...]:
-    """Every complete map version."""
-    return solved_maps(cast(Mapped, row.envelope.event) for row in log.read(MAPPED_STREAM))
 
 
 def logged_map(log: EventLog) -> SolvedMap:
