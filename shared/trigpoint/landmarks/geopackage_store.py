@@ -53,6 +53,7 @@ class GeoPackageStore:
     def __init__(self, path: Path, *, read_only: bool = False) -> None:
         self._path = path
         self._connection: Connection = opened(path, read_only=read_only)
+        self._driver = driver_of(self._connection)
         self._extent: tuple[int, MapExtent | None] | None = None
 
     def apply(self, change: MapChange, checkpoint: Checkpoint) -> None:
@@ -140,7 +141,7 @@ class GeoPackageStore:
             as_of=older,
             limited=query.limit is not None and box is None,
         )
-        return map(landmark_of, driver_of(self._connection).execute(landmark_sql(source, shape), bound))
+        return map(landmark_of, self._driver.execute(landmark_sql(source, shape), bound))
 
     def _window(self, box: DegreeBox) -> dict[str, float] | None:
         """The grid window to look a box up in; None where the index cannot serve and columns must."""
@@ -152,17 +153,16 @@ class GeoPackageStore:
 
     def _held_extent(self) -> MapExtent | None:
         """The map's extent, looked up anew whenever another process has written."""
-        (data_version,) = driver_of(self._connection).execute("PRAGMA data_version").fetchone()
+        (data_version,) = self._driver.execute("PRAGMA data_version").fetchone()
         if self._extent is None or self._extent[0] != data_version:
-            self._extent = (data_version, held_extent(driver_of(self._connection)))
+            self._extent = (data_version, held_extent(self._driver))
         return self._extent[1]
 
     def _adopt_crs(self, crs: str) -> None:
         reference = schema.spatial_reference_of(crs)
         insert_reference(self._connection, reference)
-        driver = driver_of(self._connection)
-        driver.execute("UPDATE gpkg_contents SET srs_id = ? WHERE data_type = 'features'", (reference.srs_id,))
-        driver.execute("UPDATE gpkg_geometry_columns SET srs_id = ?", (reference.srs_id,))
+        self._driver.execute("UPDATE gpkg_contents SET srs_id = ? WHERE data_type = 'features'", (reference.srs_id,))
+        self._driver.execute("UPDATE gpkg_geometry_columns SET srs_id = ?", (reference.srs_id,))
 
     def _write(self, change: MapChange) -> None:
         srs_id = schema.spatial_reference_of(change.version.crs).srs_id
@@ -174,11 +174,10 @@ class GeoPackageStore:
         self._insert(tables.image_offsets, [records.plain_record(row) for row in change.image_offsets])
 
     def _open_landmarks(self, change: MapChange, srs_id: int) -> None:
-        driver = driver_of(self._connection)
         values = (record_of(landmark, srs_id=srs_id) for landmark in change.opened)
         try:
-            with indexed_at_once(driver, "landmarks"):
-                driver.executemany(INSERT_SQL, values)
+            with indexed_at_once(self._driver, "landmarks"):
+                self._driver.executemany(INSERT_SQL, values)
         except sqlite3.IntegrityError as error:
             reason = f"map version {change.version.map_version} opens a landmark still valid: {error}"
             raise InputError(reason) from error
@@ -189,16 +188,15 @@ class GeoPackageStore:
 
     def _close_landmarks(self, landmarks: Sequence[str], map_version: int) -> None:
         columns = ", ".join(name for name in COLUMNS if name != "valid_to_version")
-        driver = driver_of(self._connection)
-        with indexed_at_once(driver, "landmark_history"):
-            moved = driver.executemany(
+        with indexed_at_once(self._driver, "landmark_history"):
+            moved = self._driver.executemany(
                 f"INSERT INTO landmark_history ({columns}, valid_to_version) "
                 f"SELECT {columns}, ? FROM landmarks WHERE landmark = ?",
                 [(map_version, landmark) for landmark in landmarks],
             ).rowcount
         if landmarks and moved != len(landmarks):
             raise InputError(f"map version {map_version} closes {len(landmarks)} landmarks: {moved} are valid")
-        driver.executemany("DELETE FROM landmarks WHERE landmark = ?", [(landmark,) for landmark in landmarks])
+        self._driver.executemany("DELETE FROM landmarks WHERE landmark = ?", [(landmark,) for landmark in landmarks])
 
     def _write_checkpoint(self, checkpoint: Checkpoint) -> None:
         self._connection.execute(delete(tables.checkpoints))
@@ -210,12 +208,11 @@ class GeoPackageStore:
     def _date_layers(self, solved_ns: int) -> None:
         """The layers' extents, and the time they changed: the version's own, so that a replay writes the same."""
         changed = (EPOCH + timedelta(microseconds=solved_ns // 1000)).strftime("%Y-%m-%dT%H:%M:%S.%f")[:-3] + "Z"
-        driver = driver_of(self._connection)
-        driver.execute("UPDATE gpkg_contents SET last_change = ?", (changed,))
+        self._driver.execute("UPDATE gpkg_contents SET last_change = ?", (changed,))
         for layer in schema.FEATURE_LAYERS:
             index = schema.rtree_name(layer.name.removeprefix("current_"))
-            box = driver.execute(f"SELECT min(minx), min(miny), max(maxx), max(maxy) FROM {index}").fetchone()
-            driver.execute(
+            box = self._driver.execute(f"SELECT min(minx), min(miny), max(maxx), max(maxy) FROM {index}").fetchone()
+            self._driver.execute(
                 "UPDATE gpkg_contents SET min_x = ?, min_y = ?, max_x = ?, max_y = ? WHERE table_name = ?",
                 (*box, layer.name),
             )
