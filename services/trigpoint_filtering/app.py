@@ -1,7 +1,6 @@
 """Filtering at work on a log: every drive in it filtered, what was not yet said of it appended."""
 
 import logging
-from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import cast
@@ -9,7 +8,7 @@ from typing import cast
 from trigpoint.events.codec import Event
 from trigpoint.events.drives import Drive, drives_of
 from trigpoint.events.envelope import Envelope
-from trigpoint.events.estimated import Estimated, FixJudged, PoseFiltered
+from trigpoint.events.estimated import Estimated, FixJudged
 from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.observed import (
     GnssFixReceived,
@@ -23,7 +22,7 @@ from trigpoint.events.observed import (
 from trigpoint.geodesy.positions import GridPosition
 from trigpoint.geodesy.projection import MapFrame, pin_map_frame
 from trigpoint.logs.ports import EventLog
-from trigpoint_filtering.core.publication import Published, output_boot_id, published
+from trigpoint_filtering.core.publication import UNSAID, Published, Said, output_boot_id, published
 from trigpoint_filtering.core.track import begun_track, tracks
 from trigpoint_filtering.settings import FilterSettings
 
@@ -56,16 +55,15 @@ def filter_log(
 
     A drive that cannot be filtered is reported with the reason, and the others go on. Raises AppendFailed.
     """
-    chosen, frame, said = settings or FilterSettings(), logged_frame(log), said_counts(log)
+    chosen, frame, said = settings or FilterSettings(), logged_frame(log), said_of(log)
     if frame is None:
         logger.warning("nothing filtered: no map frame is pinned in stream %r", FRAME_STREAM)
         return ()
-    return tuple(
-        _filtered(
-            log, drive, frame, chosen, said[output_boot_id(drive.vehicle, drive.boot_id, frame, chosen)], progress
-        )
-        for drive in logged_drives(log)
-    )
+    reports = []
+    for drive in logged_drives(log):
+        before = said.get(output_boot_id(drive.vehicle, drive.boot_id, frame, chosen), UNSAID)
+        reports.append(_filtered(log, drive, frame, chosen, before, progress))
+    return tuple(reports)
 
 
 def logged_frame(log: EventLog) -> MapFrame | None:
@@ -84,37 +82,41 @@ def logged_drives(log: EventLog) -> Iterator[Drive]:
             yield from drives_of(rows)
 
 
-def said_counts(log: EventLog) -> Counter[str]:
-    """How many events of each of its own boots filtering has appended."""
-    return Counter(logged.envelope.identity.boot_id for logged in log.read(STREAM))
+def said_of(log: EventLog) -> dict[str, Said]:
+    """What filtering has appended so far, by its own boots."""
+    said: dict[str, Said] = {}
+    for logged in log.read(STREAM):
+        boot_id = logged.envelope.identity.boot_id
+        said[boot_id] = said.get(boot_id, UNSAID).with_row(cast(Envelope[Estimated], logged.envelope))
+    return said
 
 
 def _filtered(
-    log: EventLog, drive: Drive, frame: MapFrame, settings: FilterSettings, said: int, progress: Progress | None
+    log: EventLog, drive: Drive, frame: MapFrame, settings: FilterSettings, said: Said, progress: Progress | None
 ) -> DriveReport:
+    if said.is_whole(drive):
+        return _report(drive, said, appended=0, refusal="")
     track = begun_track(drive, frame, settings)
     publication = Published(output_boot_id(drive.vehicle, drive.boot_id, frame, settings))
     rows: list[Envelope[Estimated]] = []
     for track in tracks(drive, frame, settings, progress=progress):
         told, publication = published(track, publication, settings)
         rows += told
-    fresh = cast(list[Envelope[Event]], rows[said:])
+    fresh = cast(list[Envelope[Event]], rows[said.count :])
     if fresh:
         log.append(STREAM, fresh)
-    posed = any(isinstance(row.event, PoseFiltered) for row in rows)
-    report = _report(drive, rows, appended=len(fresh), refusal="" if posed else track.refusal)
-    if report.refusal:
-        logger.warning("drive %s of %s has no pose: %s", drive.boot_id, drive.vehicle, report.refusal)
-    return report
+    whole = UNSAID.with_rows(rows)
+    if not whole.poses:
+        logger.warning("drive %s of %s has no pose: %s", drive.boot_id, drive.vehicle, track.refusal)
+    return _report(drive, whole, appended=len(fresh), refusal="" if whole.poses else track.refusal)
 
 
-def _report(drive: Drive, rows: list[Envelope[Estimated]], *, appended: int, refusal: str) -> DriveReport:
-    verdicts = Counter(row.event.accepted for row in rows if isinstance(row.event, FixJudged))
+def _report(drive: Drive, said: Said, *, appended: int, refusal: str) -> DriveReport:
     return DriveReport(
         vehicle=drive.vehicle,
         boot_id=drive.boot_id,
-        accepted=verdicts[True],
-        rejected=verdicts[False],
+        accepted=said.accepted,
+        rejected=said.verdicts - said.accepted,
         appended=appended,
         refusal=refusal,
     )

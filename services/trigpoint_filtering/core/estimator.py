@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter
+from filterpy.kalman import MerweScaledSigmaPoints, UnscentedKalmanFilter, unscented_transform
 from numpy.typing import NDArray
 
 from trigpoint.geodesy.uncertainty import floored_covariance
@@ -75,8 +75,16 @@ class _SigmaPoints(MerweScaledSigmaPoints):  # type: ignore[misc]
 class _Filter(UnscentedKalmanFilter):  # type: ignore[misc]
     """filterpy's filter with the loops over sigma points done by array."""
 
+    x: Floats
+    P: Floats
+
     def compute_process_sigmas(self, dt: float, fx: object = None, **fx_args: object) -> None:
         self.sigmas_f = self.fx(self.points_fn.sigma_points(self.x, self.P), dt, **fx_args)
+
+    def predict(self, dt: float, **fx_args: object) -> None:
+        """filterpy's, without drawing sigma points anew: a correction draws its own."""
+        self.compute_process_sigmas(dt, **fx_args)
+        self.x, self.P = unscented_transform(self.sigmas_f, self.Wm, self.Wc, self.Q)
 
     def cross_variance(self, x: Floats, z: Floats, sigmas_f: Floats, sigmas_h: Floats) -> Floats:
         crossed: Floats = (self.Wc[:, None] * (sigmas_f - x)).T @ (sigmas_h - z)
@@ -152,8 +160,15 @@ def sound_covariance(covariance: Floats) -> Floats:
     return correlation * np.outer(sigma, sigma)
 
 
-def pose_covariance(belief: Belief) -> Floats:
-    """The covariance (3, 3) of x, y in m and heading in rad, positive definite by a margin."""
-    part = belief.covariance[:SPEED_SCALE, :SPEED_SCALE]
-    margin = part.diagonal().min() * CORRELATION_FLOOR
-    return floored_covariance(part, floor=max(float(margin), POSE_COVARIANCE_FLOOR))
+def pose_covariance(covariance: Floats) -> Floats:
+    """The part (3, 3), x, y in m and heading in rad, of a covariance (10, 10), positive definite by a margin."""
+    part = covariance[:SPEED_SCALE, :SPEED_SCALE]
+    return floored_covariance(part, floor=POSE_COVARIANCE_FLOOR)
+
+
+def pose_covariances(covariance: Floats) -> Floats:
+    """`pose_covariance` of many at once: (n, 3, 3) from (n, 3, 3); what is sound stays as it is."""
+    symmetric: Floats = 0.5 * (covariance + covariance.transpose(0, 2, 1))
+    for index in np.flatnonzero(np.linalg.eigvalsh(symmetric)[:, 0] < POSE_COVARIANCE_FLOOR):
+        symmetric[index] = floored_covariance(symmetric[index], floor=POSE_COVARIANCE_FLOOR)
+    return symmetric

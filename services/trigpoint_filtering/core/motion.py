@@ -18,6 +18,7 @@ Floats = NDArray[np.float64]
 X, Y, HEADING, SPEED_SCALE, TURN_SCALE, TURN_BIAS, ANTENNA_X, ANTENNA_Y, BIAS_X, BIAS_Y = range(10)
 STATE_SIZE = 10
 
+TINY_RAD = 1e-12  # keeps sin(angle) / angle defined on straights
 MAX_STEERING_RAD = 1.2  # beyond any road vehicle's lock; keeps the tangent tame
 MIN_WHEEL_RATIO = 0.2  # of the base's speed at the speed wheel: a tighter turn is not believed
 
@@ -120,8 +121,9 @@ def moved(state: Floats, step: MotionStep, geometry: Geometry, *, bias_time_s: f
     """States (n, 10) after a step: an arc of constant speed and yaw rate; the GNSS bias decays."""
     speed_mps, yaw_rate_radps = base_motion(state, step, geometry)
     turned_rad = yaw_rate_radps * step.dt_s
-    chord_m = speed_mps * step.dt_s * geometry.point_scale * np.sinc(turned_rad / (2.0 * math.pi))
-    middle_rad = state[:, HEADING] + 0.5 * turned_rad
+    half_rad = 0.5 * turned_rad + TINY_RAD
+    chord_m = speed_mps * (step.dt_s * geometry.point_scale) * np.sin(half_rad) / half_rad
+    middle_rad = state[:, HEADING] + half_rad
     after = state.copy()
     after[:, X] += chord_m * np.cos(middle_rad)
     after[:, Y] += chord_m * np.sin(middle_rad)

@@ -69,8 +69,9 @@ def after_imu(track: Track, yaw_rate_radps: float, *, stamp_ns: int) -> Track:
 
 def with_odometer(track: Track, odometer: Odometer) -> Track:
     """The track with new samples in its odometer, and a step taken if one is due."""
-    track = replace(track, odometer=odometer, verdict=None, alarm=None)
-    return _stepped(track) if is_step_due(track.following, odometer) else track
+    if is_step_due(track.following, odometer):
+        return _stepped(track, odometer)
+    return replace(track, odometer=odometer, verdict=None, alarm=None)
 
 
 def is_step_due(following: Following, odometer: Odometer) -> bool:
@@ -78,22 +79,28 @@ def is_step_due(following: Following, odometer: Odometer) -> bool:
     return odometer.pending.s >= following.settings.max_step_s - 1e-6
 
 
-def _stepped(track: Track) -> Track:
-    """The track with the pending motion taken into its hypotheses and its dead reckoning."""
-    step, odometer = taken_step(track.odometer)
+def _stepped(track: Track, odometer: Odometer) -> Track:
+    """The track with the odometer's pending motion taken into its hypotheses and its dead reckoning."""
+    step, odometer = taken_step(odometer)
     if step is None:
-        return replace(track, odometer=odometer)
-    track = _calibrated_for(replace(track, odometer=odometer, step=step, believed_ns=odometer.stamp_ns), step.source)
+        return replace(track, odometer=odometer, verdict=None, alarm=None)
+    if step.source is not track.source:
+        track = _calibrated_for(track, step.source)
     blind_s = max(step.blind_s, silent_s(odometer, odometer.stamp_ns))
     if blind_s > LOST_AFTER_S:
-        return _lost(track, f"no wheel speed for {blind_s:.0f} s: {LOST_AFTER_S:.0f} s is the limit")
+        track = _lost(track, f"no wheel speed for {blind_s:.0f} s: {LOST_AFTER_S:.0f} s is the limit")
     hypothesis, alternate = track.hypothesis, track.alternate
     return replace(
         track,
+        odometer=odometer,
+        step=step,
+        believed_ns=odometer.stamp_ns,
         hypothesis=_predicted(track, hypothesis, step) if hypothesis else None,
         alternate=_predicted(track, alternate, step) if alternate else None,
         seeker=_reckoned(track, step),
         calibration=_rested_calibration(track, step),
+        verdict=None,
+        alarm=None,
     )
 
 
@@ -146,8 +153,6 @@ def _reckoned(track: Track, step: MotionStep) -> Seeker | None:
 
 def _calibrated_for(track: Track, source: TurnSource) -> Track:
     """The track with calibration states that belong to the turn source now in use."""
-    if track.source is source:
-        return track
     following = track.following
     prior = prior_calibration(source, following.geometry, antenna_sigma_m=following.settings.antenna_sigma_m)
     if track.calibration is None:
@@ -176,8 +181,7 @@ def after_fix(track: Track, position: MapPosition, *, stamp_ns: int, sigma_m: fl
     """The track after a fix, with its verdict on it; `sigma_m` NaN where the receiver declares none."""
     late_s = (track.odometer.stamp_ns - stamp_ns) * SECONDS_PER_NS
     noise = gnss_noise(sigma_m, track.following.settings)
-    track = replace(track, odometer=advanced(track.odometer, stamp_ns), noise=noise, fix_ns=stamp_ns, alarm=None)
-    track = _stepped(track)
+    track = replace(_stepped(track, advanced(track.odometer, stamp_ns)), noise=noise, fix_ns=stamp_ns)
     point_m = np.array([position.x_m, position.y_m])
     if late_s > LATE_LIMIT_S or not np.all(np.isfinite(point_m)):
         return told(track, unjudged(LATE), sequence)

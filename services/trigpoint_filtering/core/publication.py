@@ -1,10 +1,12 @@
 """What a track gives out: every verdict and alarm, and poses at a bounded rate, numbered as events."""
 
 import hashlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 
+from trigpoint.events.drives import Drive
 from trigpoint.events.envelope import Envelope, EventIdentity
-from trigpoint.events.estimated import Estimated, PoseFiltered
+from trigpoint.events.estimated import Estimated, FixJudged, PoseFiltered
 from trigpoint.geodesy.poses import wrap_angle_rad
 from trigpoint.geodesy.projection import MapFrame
 from trigpoint_filtering.core.estimator import Belief, pose_covariance
@@ -13,6 +15,7 @@ from trigpoint_filtering.core.motion import HEADING, X, Y
 from trigpoint_filtering.settings import FilterSettings
 
 SOURCE = "filtering"
+WHOLE_WITHIN_NS = 1_000_000_000  # of a drive's end: poses come several times a second
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,5 +65,45 @@ def _pose(track: Track, belief: Belief) -> PoseFiltered:
         y_m=float(belief.mean[Y]),
         heading_rad=wrap_angle_rad(float(belief.mean[HEADING])),
         speed_mps=base_speed_mps(track),
-        covariance=pose_covariance(belief),
+        covariance=pose_covariance(belief.covariance),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What of a drive's estimates is there already: events, verdicts and accepted ones, poses, newest pose."""
+
+    count: int = 0
+    verdicts: int = 0
+    accepted: int = 0
+    poses: int = 0
+    pose_ns: int = -1
+
+    def with_row(self, row: Envelope[Estimated]) -> "Said":
+        """The same with one more event."""
+        event = row.event
+        judged = isinstance(event, FixJudged)
+        posed = isinstance(event, PoseFiltered)
+        return Said(
+            self.count + 1,
+            self.verdicts + judged,
+            self.accepted + (isinstance(event, FixJudged) and event.accepted),
+            self.poses + posed,
+            max(self.pose_ns, row.stamp_ns) if posed else self.pose_ns,
+        )
+
+    def with_rows(self, rows: Iterable[Envelope[Estimated]]) -> "Said":
+        """The same with more events."""
+        said = self
+        for row in rows:
+            said = said.with_row(row)
+        return said
+
+    def is_whole(self, drive: Drive) -> bool:
+        """Whether every fix of a drive has its verdict and poses reach its last wheel sample."""
+        if self.poses == 0 or self.verdicts < len(drive.fixes.stamp_ns) or len(drive.wheels.stamp_ns) == 0:
+            return False
+        return int(drive.wheels.stamp_ns[-1]) - self.pose_ns <= WHOLE_WITHIN_NS
+
+
+UNSAID = Said()

@@ -11,7 +11,7 @@ from trigpoint.events.estimated import FixJudged, GateAlarmed
 from trigpoint.geodesy.poses import wrap_angles_rad
 from trigpoint.geodesy.positions import MapPosition
 from trigpoint.geodesy.projection import MapFrame, map_points_from_wgs84
-from trigpoint_filtering.core.estimator import Belief, pose_covariance
+from trigpoint_filtering.core.estimator import Belief, pose_covariances
 from trigpoint_filtering.core.following import Track, base_speed_mps, started_track
 from trigpoint_filtering.core.motion import ANTENNA_X, ANTENNA_Y, HEADING, SPEED_SCALE, STATE_SIZE, X
 from trigpoint_filtering.core.odometer import Odometer, after_imu_sample, after_wheel_sample
@@ -77,10 +77,12 @@ def begun_track(drive: Drive, frame: MapFrame, settings: FilterSettings) -> Trac
 def tracks(
     drive: Drive, frame: MapFrame, settings: FilterSettings, *, progress: Progress | None = None
 ) -> Iterator[Track]:
-    """The track of a drive whenever it has taken a step or a fix, and at last.
+    """The track of a drive whenever it has taken a step or a fix; nothing for a drive without fixes.
 
     The same functions as in the online fold; samples between steps are folded into the odometer alone.
     """
+    if len(drive.fixes.stamp_ns) == 0:
+        return
     track = begun_track(drive, frame, settings)
     odometer = track.odometer
     samples = (_wheel_rows(drive), _imu_rows(drive), _fix_rows(drive, frame))
@@ -142,8 +144,6 @@ def _imu_rows(drive: Drive) -> Iterator[tuple[float, ...]]:
 
 def _fix_rows(drive: Drive, frame: MapFrame) -> Iterator[tuple[float, ...]]:
     fixes = drive.fixes
-    if len(fixes.stamp_ns) == 0:
-        return iter(())
     point_m = map_points_from_wgs84(fixes.lat_deg, fixes.lon_deg, frame)
     return _rows(point_m[:, 0], point_m[:, 1], fixes.stamp_ns, fixes.sigma_m, fixes.sequence)
 
@@ -177,7 +177,7 @@ class _Recording:
                 column.pop()
         self.stamp_ns.append(track.believed_ns)
         self.mean.append(belief.mean)
-        self.covariance.append(pose_covariance(belief))
+        self.covariance.append(belief.covariance[:SPEED_SCALE, :SPEED_SCALE])
         self.speed_mps.append(base_speed_mps(track))
 
     def filtered(self, track: Track) -> FilteredDrive:
@@ -189,7 +189,7 @@ class _Recording:
             boot_id=track.following.boot_id,
             stamp_ns=np.array(self.stamp_ns, dtype=np.int64),
             pose=pose,
-            covariance=np.array(self.covariance).reshape(-1, 3, 3),
+            covariance=pose_covariances(np.array(self.covariance).reshape(-1, 3, 3)),
             speed_mps=np.array(self.speed_mps),
             antenna_m=mean[:, ANTENNA_X : ANTENNA_Y + 1],
             judged=tuple(self.judged),
