@@ -62,7 +62,9 @@ def build(log: EventLog, settings: SolveSettings, *, progress: Callable[[str, fl
     version = newest_version(log) + 1
     head = replace(solution.map.head, inputs=inputs, wall_s=time.monotonic() - begun_s)
     numbered = tuple(replace(event, map_version=version) for event in (*events[:-1], head))
-    log.append(STREAM, _envelopes(numbered, boot_id=_boot_id(version, inputs, settings), stamp_ns=_last_seen_ns(solution)))
+    log.append(
+        STREAM, _envelopes(numbered, boot_id=_boot_id(version, inputs, settings), stamp_ns=_last_seen_ns(solution))
+    )
     return solution
 
 

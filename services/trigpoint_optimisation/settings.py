@@ -23,7 +23,7 @@ class FixSettings:
 # Yi, Worrall and Nebot, section III-B: one edge every 10 m of travel, sigma 5 m east and north.
 PAPER_EDGES = FixSettings(spacing_m=10.0, sigma_m=5.0, bias_sigma_m=0.0, bias_time_s=1.0, cauchy_scale=2.0)
 # The error of real receivers is correlated over tens of seconds: white part and slow part apart.
-HONEST_EDGES = FixSettings(spacing_m=2.0, sigma_m=1.5, bias_sigma_m=2.5, bias_time_s=60.0, cauchy_scale=2.0)
+HONEST_EDGES = FixSettings(spacing_m=2.0, sigma_m=1.5, bias_sigma_m=2.5, bias_time_s=300.0, cauchy_scale=2.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,10 +34,10 @@ class CalibrationPriors:
     turn_scale_imu: float = 0.005
     turn_scale_steering: float = 0.10
     turn_scale_wheels: float = 0.20
-    turn_bias_imu_radps: float = 0.02
+    turn_bias_imu_radps: float = 0.01
     turn_bias_steering_rad: float = 0.03
     turn_bias_wheels_radpm: float = 0.02
-    turn_bias_walk_fraction: float = 0.10  # of the bias sigma, per sqrt(minute)
+    turn_bias_walk_fraction: float = 0.05  # of the bias sigma, per sqrt(minute)
     turn_bias_knot_s: float = 60.0
     delay_s: float = 0.05
     antenna_m: float = 0.30
@@ -48,14 +48,15 @@ class OdometrySettings:
     """Random part of odometry (see OdometryNoise) and where keyframes stand."""
 
     along_m: float = 0.03
-    across_m: float = 0.02
+    across_m: float = 0.01
     heading_rad: float = 0.004
-    heading_imu_rad: float = 0.0005
-    heading_rad_per_sqrt_s: float = 0.0005
+    heading_imu_rad: float = 0.0001
+    heading_rad_per_sqrt_s: float = 0.0003
     turn_fraction: float = 0.02
-    turn_fraction_imu: float = 0.002
+    turn_fraction_imu: float = 0.001
     floor_m: float = 0.005
     floor_rad: float = 0.0005
+    floor_imu_rad: float = 0.00005
     keyframe_m: float = 2.0
     keyframe_rad: float = 0.2
     max_gap_s: float = 2.0

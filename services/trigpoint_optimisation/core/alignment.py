@@ -179,7 +179,9 @@ def _smooth_correction(correction_m: Floats, weight: Floats, path_m: Floats) -> 
     return smooth
 
 
-def bent_alignment(path_pose: Floats, antenna_base_m: Floats, fix_m: Floats, *, path_m: Floats, sigma_m: float) -> BentAlignment:
+def bent_alignment(
+    path_pose: Floats, antenna_base_m: Floats, fix_m: Floats, *, path_m: Floats, sigma_m: float
+) -> BentAlignment:
     """The path of a drive brought into the map by its fixes, heading first, then position.
 
     path_pose (n, 3): dead-reckoned base poses at the fixes, fix_m (n, 2) in the map, path_m (n,) path length at

@@ -5,9 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from trigpoint.geodesy.poses import transform_points
+from trigpoint_optimisation.core.detection_noise import DetectionNoise, measured_noise
 from trigpoint_optimisation.core.fleet import Fleet, detections_in_map
 from trigpoint_optimisation.core.merging import LandmarkGroups, Tracks, voted_pairs
-from trigpoint_optimisation.core.sightings import Sightings, drive_sightings, joined
+from trigpoint_optimisation.core.sightings import Sightings, drive_sightings, joined, keyframe_points
 from trigpoint_optimisation.core.state import MapState
 from trigpoint_optimisation.core.tracklets import close_pairs, linked_tracks, seen_together
 from trigpoint_optimisation.settings import DetectionSettings
@@ -62,7 +64,9 @@ def _linked_fleet(fleet: Fleet, state: MapState) -> tuple[tuple[Ints, ...], froz
     total, apart, track = 0, set(), []
     for each, point in zip(fleet.prepared, detections_in_map(fleet, state), strict=True):
         stamp_ns = each.drive.detections.stamp_ns
-        usable = each.detection_usable & np.array([kind != "vehicle" for kind in each.drive.detections.kind], dtype=bool)
+        usable = each.detection_usable & np.array(
+            [kind != "vehicle" for kind in each.drive.detections.kind], dtype=bool
+        )
         own = linked_tracks(stamp_ns, point, usable, settings=fleet.settings.detections)
         apart |= {(a + total, b + total) for a, b in seen_together(own, stamp_ns)}
         track.append(np.where(own >= 0, own + total, -1))
@@ -115,15 +119,11 @@ def first_association(fleet: Fleet, state: MapState) -> Association:
     if fleet.settings.known_association:
         track, landmark = _named_tracks(fleet)
         kind, kinds = _kinds_of_tracks(fleet, track, len(landmark))
-        return Association(
-            track=track, landmark_of_track=landmark, kind_of_track=kind, kinds=kinds, apart=frozenset()
-        )
+        return Association(track=track, landmark_of_track=landmark, kind_of_track=kind, kinds=kinds, apart=frozenset())
     track, apart = _linked_fleet(fleet, state)
     count = 1 + max((int(own.max(initial=-1)) for own in track), default=-1)
     kind, kinds = _kinds_of_tracks(fleet, track, count)
-    single = Association(
-        track=track, landmark_of_track=np.arange(count), kind_of_track=kind, kinds=kinds, apart=apart
-    )
+    single = Association(track=track, landmark_of_track=np.arange(count), kind_of_track=kind, kinds=kinds, apart=apart)
     tracks = tracks_in_map(fleet, state, single)
     groups = LandmarkGroups(count, apart)
     for a, b in close_pairs(tracks.point_m, SAME_PASS_GATE_M):
@@ -176,7 +176,36 @@ def fleet_sightings(fleet: Fleet, association: Association) -> Sightings:
     """The sightings of all drives under the association."""
     return joined(
         [
-            drive_sightings(each, track, point_scale=fleet.frame.point_scale, settings=fleet.settings.detections)
-            for each, track in zip(fleet.prepared, association.track, strict=True)
+            drive_sightings(each, track, point_scale=fleet.frame.point_scale, noise=noise)
+            for each, track, noise in zip(fleet.prepared, association.track, fleet.noise, strict=True)
         ]
+    )
+
+
+def with_measured_noise(fleet: Fleet, state: MapState, association: Association) -> Fleet:
+    """The fleet with the noise that each drive's detections show against the solved landmarks."""
+    noise = tuple(
+        _measured_drive_noise(fleet, index, state, association.landmark_of_track, association.track[index])
+        for index in range(len(fleet.prepared))
+    )
+    return replace(fleet, noise=noise)
+
+
+def _measured_drive_noise(fleet: Fleet, index: int, state: MapState, landmark: Ints, track: Ints) -> DetectionNoise:
+    each, rows = fleet.prepared[index], np.nonzero(track >= 0)[0]
+    keyframe, offset = each.detection_keyframe[rows], each.detection_offset[rows]
+    pose = state.drives[index].pose[keyframe]
+    from_keyframe = state.landmark_m[landmark[track[rows]]] - pose[:, :2]
+    c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+    expected = np.column_stack(
+        [c * from_keyframe[:, 0] + s * from_keyframe[:, 1], c * from_keyframe[:, 1] - s * from_keyframe[:, 0]]
+    )
+    described, scale = each.drive.described, fleet.frame.point_scale
+    mount = scale * np.array([described.landmark_sensor_x_m, described.landmark_sensor_y_m])
+    return measured_noise(
+        keyframe_points(each, point_scale=scale)[rows],
+        expected,
+        transform_points(offset, np.broadcast_to(mount, (len(rows), 2))),
+        track[rows] * len(each.stamp_ns) + keyframe,
+        fleet.noise[index],
     )

@@ -56,7 +56,12 @@ def odometry_factor(
 
 
 def fix_factor(
-    keys: tuple[int, ...], fix_m: Floats, *, T_keyframe_base: Floats, bias_weight: tuple[float, float], noise: gtsam.noiseModel.Base
+    keys: tuple[int, ...],
+    fix_m: Floats,
+    *,
+    T_keyframe_base: Floats,
+    bias_weight: tuple[float, float],
+    noise: gtsam.noiseModel.Base,
 ) -> gtsam.CustomFactor:
     """A fix (2,) in the map against the antenna at lever arm keys[1] (2,) of the base at the fix's time.
 

@@ -15,10 +15,8 @@ Bools = NDArray[np.bool_]
 
 SIGMAS_PER_MAD = 1.4826  # of a normal distribution
 WHITE_LIMITS_M = (0.3, 5.0)
-SLOW_LIMITS_M = (1.0, 8.0)
-SLOW_TIME_LIMITS_S = (15.0, 120.0)
+SLOW_MOST_M = 8.0
 NEIGHBOUR_S = 2.5  # two fixes this close in time share their slow error
-LAG_S = 10.0  # at which the slow error's decay is read
 MIN_PAIRS = 20
 MOVED_M = 0.3  # a standing receiver repeats itself: such pairs say nothing of its noise
 
@@ -34,10 +32,11 @@ def fix_residuals(prepared: PreparedDrive, state: DriveState) -> Floats:
 def measured_fix_settings(
     prepared: PreparedDrive, state: DriveState, trusted: Bools, fixes: FixSettings
 ) -> FixSettings:
-    """The fix settings with white sigma, slow sigma and slow time as the drive's residuals show them.
+    """The fix settings with white and slow sigma as the drive's residuals show them.
 
-    White from differences of neighbouring fixes, slow from what the residuals have beyond it, its time from their
-    correlation at `LAG_S`, all by medians (Rousseeuw and Croux 1993); within limits, as the fitted path hides part.
+    White from differences of neighbouring fixes, slow from what the residuals have beyond it, by medians (Rousseeuw
+    and Croux 1993). The fitted path follows the slow error and hides most of it, and all of its duration: the slow
+    sigma is never below the given one, and the given time stays.
     """
     rows = np.nonzero(trusted)[0]
     residual = fix_residuals(prepared, state)[rows]
@@ -52,25 +51,9 @@ def measured_fix_settings(
     return replace(
         fixes,
         sigma_m=float(np.clip(white, *WHITE_LIMITS_M)),
-        bias_sigma_m=float(np.clip(1.5 * slow, *SLOW_LIMITS_M)),
-        bias_time_s=_decay_time_s(residual, stamp_s, slow),
+        bias_sigma_m=float(np.clip(slow, fixes.bias_sigma_m, SLOW_MOST_M)),
     )
 
 
 def _sigma(values: Floats) -> float:
     return SIGMAS_PER_MAD * float(np.median(np.abs(values)))
-
-
-def _decay_time_s(residual: Floats, stamp_s: Floats, slow_m: float) -> float:
-    """Time constant of the slow error from the spread of differences `LAG_S` apart: 2 slow^2 (1 - exp(-lag / time))."""
-    later = np.searchsorted(stamp_s, stamp_s + LAG_S)
-    i = np.nonzero(later < len(stamp_s))[0]
-    close = stamp_s[later[i]] - stamp_s[i] < LAG_S + NEIGHBOUR_S
-    i = i[close]
-    if len(i) < MIN_PAIRS or slow_m <= 0.0:
-        return SLOW_TIME_LIMITS_S[1]
-    spread = _sigma(residual[later[i]] - residual[i])
-    kept = 1.0 - min(spread**2 / (2.0 * slow_m**2), 0.999)
-    if kept <= 0.0:
-        return SLOW_TIME_LIMITS_S[0]
-    return float(np.clip(-LAG_S / np.log(kept), *SLOW_TIME_LIMITS_S))

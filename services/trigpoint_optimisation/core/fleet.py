@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from trigpoint.events.drives import Drive
 from trigpoint.geodesy.poses import transform_points
 from trigpoint.geodesy.projection import MapFrame
+from trigpoint_optimisation.core.detection_noise import DetectionNoise, nominal_noise
 from trigpoint_optimisation.core.fix_noise import measured_fix_settings
 from trigpoint_optimisation.core.gauss_newton import solved
 from trigpoint_optimisation.core.graph import add_fixes, chosen_fixes, fix_bias_stamps, fleet_graph
@@ -26,13 +27,15 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fleet:
-    """The drives of a solve. `trusted` (f,) per drive: fixes that may enter the graph; `fixes`: how noisy they are."""
+    """The drives of a solve. `trusted` (f,) per drive: fixes that may enter the graph; `fixes` and `noise`: how noisy
+    fixes and landmark detections are."""
 
     frame: MapFrame
     settings: SolveSettings
     prepared: tuple[PreparedDrive, ...]
     trusted: tuple[Bools, ...]
     fixes: tuple[FixSettings, ...]
+    noise: tuple[DetectionNoise, ...]
 
 
 def prepared_fleet(
@@ -51,7 +54,12 @@ def prepared_fleet(
     )
     trusted = tuple(mask & each.fix_usable for mask, each in zip(allowed, prepared, strict=True))
     return Fleet(
-        frame=frame, settings=settings, prepared=prepared, trusted=trusted, fixes=(settings.fixes,) * len(prepared)
+        frame=frame,
+        settings=settings,
+        prepared=prepared,
+        trusted=trusted,
+        fixes=(settings.fixes,) * len(prepared),
+        noise=(nominal_noise(settings.detections),) * len(prepared),
     )
 
 
@@ -140,6 +148,8 @@ def solved_state(graph: gtsam.NonlinearFactorGraph, state: MapState, *, max_iter
 def detections_in_map(fleet: Fleet, state: MapState) -> tuple[Floats, ...]:
     """Every drive's detected points (d, 2) in the map as its keyframes place them."""
     return tuple(
-        transform_points(drive.pose[each.detection_keyframe], keyframe_points(each, point_scale=fleet.frame.point_scale))
+        transform_points(
+            drive.pose[each.detection_keyframe], keyframe_points(each, point_scale=fleet.frame.point_scale)
+        )
         for each, drive in zip(fleet.prepared, state.drives, strict=True)
     )

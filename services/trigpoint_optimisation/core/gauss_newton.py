@@ -23,7 +23,11 @@ def elimination_order(linear: gtsam.GaussianFactorGraph, last: Sequence[int]) ->
 
 
 def solved(
-    graph: gtsam.NonlinearFactorGraph, values: gtsam.Values, *, last: Sequence[int], max_iterations: int = MAX_ITERATIONS
+    graph: gtsam.NonlinearFactorGraph,
+    values: gtsam.Values,
+    *,
+    last: Sequence[int],
+    max_iterations: int = MAX_ITERATIONS,
 ) -> gtsam.Values:
     """The values at the nearest minimum of the graph's cost; steps are halved while they do not lower it."""
     cost = graph.error(values)

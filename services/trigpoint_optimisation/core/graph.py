@@ -51,9 +51,7 @@ def with_cauchy(noise: gtsam.noiseModel.Base, scale: float | None) -> gtsam.nois
 
 
 def _calibration_vector(calibration: OdometryCalibration, knot: int) -> Floats:
-    return np.array(
-        [calibration.speed_scale, calibration.turn_scale, calibration.delay_s, calibration.turn_bias[knot]]
-    )
+    return np.array([calibration.speed_scale, calibration.turn_scale, calibration.delay_s, calibration.turn_bias[knot]])
 
 
 def add_motions(graph: gtsam.NonlinearFactorGraph, prepared: PreparedDrive) -> None:
@@ -156,9 +154,7 @@ def add_sightings(
     x, y = sightings.point_m.T
     range_m = np.hypot(x, y)
     rows = np.nonzero((landmark >= 0) & (range_m > MIN_RANGE_M))[0]
-    to_polar = np.stack(
-        [np.stack([-y / range_m**2, x / range_m**2], -1), np.stack([x / range_m, y / range_m], -1)], -2
-    )
+    to_polar = np.stack([np.stack([-y / range_m**2, x / range_m**2], -1), np.stack([x / range_m, y / range_m], -1)], -2)
     covariance = to_polar @ sightings.covariance @ to_polar.transpose(0, 2, 1)
     bearing = np.arctan2(y, x)
     for row in rows:
@@ -179,7 +175,9 @@ def add_labels(graph: gtsam.NonlinearFactorGraph, labels: TiedLabels, *, cauchy_
         graph.add(anchor_factor(tuple(keys), labels.label_m[row], noise=noise))
 
 
-def fleet_graph(prepared: Sequence[PreparedDrive], priors: CalibrationPriors, *, point_scale: float) -> gtsam.NonlinearFactorGraph:
+def fleet_graph(
+    prepared: Sequence[PreparedDrive], priors: CalibrationPriors, *, point_scale: float
+) -> gtsam.NonlinearFactorGraph:
     """The graph of what every solve has: odometry and calibration priors of all drives."""
     graph = gtsam.NonlinearFactorGraph()
     for each in prepared:

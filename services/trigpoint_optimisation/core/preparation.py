@@ -70,7 +70,7 @@ def odometry_noise(source: TurnSource, settings: OdometrySettings) -> OdometryNo
         heading_rad_per_sqrt_s=settings.heading_rad_per_sqrt_s,
         turn_fraction=settings.turn_fraction_imu if by_imu else settings.turn_fraction,
         floor_m=settings.floor_m,
-        floor_rad=settings.floor_rad,
+        floor_rad=settings.floor_imu_rad if by_imu else settings.floor_rad,
     )
 
 
@@ -83,7 +83,13 @@ def _hung(path: DeadReckonedPath, keyframe_ns: Ints, stamp_ns: Ints) -> tuple[In
 
 
 def prepared_drive(
-    drive: Drive, frame: MapFrame, settings: SolveSettings, *, index: int, calibration: OdometryCalibration, keyframe_ns: Ints | None = None
+    drive: Drive,
+    frame: MapFrame,
+    settings: SolveSettings,
+    *,
+    index: int,
+    calibration: OdometryCalibration,
+    keyframe_ns: Ints | None = None,
 ) -> PreparedDrive:
     """The drive ready for the graph; `keyframe_ns` keeps earlier keyframes under a new calibration."""
     source, odometry = turn_source(drive), settings.odometry

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trigpoint.geodesy.poses import transform_points
+from trigpoint_optimisation.core.detection_noise import DetectionNoise
 from trigpoint_optimisation.core.preparation import PreparedDrive, detected_points
-from trigpoint_optimisation.settings import DetectionSettings
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -30,18 +30,20 @@ def keyframe_points(prepared: PreparedDrive, *, point_scale: float) -> Floats:
     return transform_points(prepared.detection_offset, detected_points(prepared, point_scale=point_scale))
 
 
-def _detection_covariances(prepared: PreparedDrive, settings: DetectionSettings) -> Floats:
+def _detection_covariances(prepared: PreparedDrive, noise: DetectionNoise) -> Floats:
     """Covariances (d, 2, 2) of the detected points in their keyframes' frames."""
     detections, described = prepared.drive.detections, prepared.drive.described
     angle = detections.bearing_rad + described.landmark_sensor_yaw_rad + prepared.detection_offset[:, 2]
     c, s = np.cos(angle), np.sin(angle)
-    along = np.full(len(angle), settings.range_sigma_m**2)
-    across = (detections.range_m * settings.bearing_sigma_rad) ** 2
+    along = np.full(len(angle), noise.range_sigma_m**2)
+    across = (detections.range_m * noise.bearing_sigma_rad) ** 2
     xy = (along - across) * c * s
-    return np.stack([np.stack([along * c * c + across * s * s, xy], -1), np.stack([xy, along * s * s + across * c * c], -1)], -2)
+    return np.stack(
+        [np.stack([along * c * c + across * s * s, xy], -1), np.stack([xy, along * s * s + across * c * c], -1)], -2
+    )
 
 
-def drive_sightings(prepared: PreparedDrive, track: Ints, *, point_scale: float, settings: DetectionSettings) -> Sightings:
+def drive_sightings(prepared: PreparedDrive, track: Ints, *, point_scale: float, noise: DetectionNoise) -> Sightings:
     """One sighting for each track and keyframe of a drive; `track` (d,) by detection, negative where none."""
     rows = np.nonzero(track >= 0)[0]
     names = np.column_stack([track[rows], prepared.detection_keyframe[rows]])
@@ -50,8 +52,8 @@ def drive_sightings(prepared: PreparedDrive, track: Ints, *, point_scale: float,
     point = np.zeros((len(unique), 2))
     covariance = np.zeros((len(unique), 2, 2))
     np.add.at(point, group, keyframe_points(prepared, point_scale=point_scale)[rows])
-    np.add.at(covariance, group, _detection_covariances(prepared, settings)[rows])
-    covariance = covariance / (count**2)[:, None, None] + settings.common_sigma_m**2 * np.eye(2)
+    np.add.at(covariance, group, _detection_covariances(prepared, noise)[rows])
+    covariance = covariance / (count**2)[:, None, None] + noise.common_sigma_m**2 * np.eye(2)
     return Sightings(
         drive=np.full(len(unique), prepared.index, dtype=np.int64),
         keyframe=unique[:, 1],

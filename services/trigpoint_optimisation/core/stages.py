@@ -30,8 +30,16 @@ from trigpoint_optimisation.core.association import (
     landmark_means,
     renewed_association,
     tracks_in_map,
+    with_measured_noise,
 )
-from trigpoint_optimisation.core.fleet import Fleet, Progress, georeferenced_graph, prepared_fleet, recalibrated, solved_state
+from trigpoint_optimisation.core.fleet import (
+    Fleet,
+    Progress,
+    georeferenced_graph,
+    prepared_fleet,
+    recalibrated,
+    solved_state,
+)
 from trigpoint_optimisation.core.georeferencing import georeferenced
 from trigpoint_optimisation.core.graph import add_labels, add_sightings
 from trigpoint_optimisation.core.marginals import Reduced, covariance_of, reduced
@@ -88,7 +96,14 @@ def no_labels() -> tuple[Labels, Assignment]:
     """No labels and nothing assigned."""
     none = np.zeros(0, dtype=np.int64)
     labels = Labels(
-        name=(), label_m=np.zeros((0, 2)), sigma_m=np.zeros(0), image=none, kind=(), signature=(), images=(), image_sigma_m=np.zeros(0)
+        name=(),
+        label_m=np.zeros((0, 2)),
+        sigma_m=np.zeros(0),
+        image=none,
+        kind=(),
+        signature=(),
+        images=(),
+        image_sigma_m=np.zeros(0),
     )
     return labels, Assignment(landmark=none, reason=())
 
@@ -105,14 +120,15 @@ def _with_landmarks(fleet: Fleet, state: MapState, progress: Progress) -> Solved
             fleet=fleet, state=state, association=association, sightings=sightings, labels=labels, assignment=assignment
         )
         state = solved_state(full_graph(solved), state)
-        fleet = recalibrated(fleet, state)
+        fleet = with_measured_noise(recalibrated(fleet, state), state, association)
         solved = replace(solved, fleet=fleet, state=state)
         progress("landmarks", (turn + 1) / ASSOCIATION_ROUNDS)
         renewed = renewed_association(fleet, state, association)
         if np.array_equal(renewed.landmark_of_track, association.landmark_of_track):
             break
         association = renewed
-    return replace(solved, sightings=fleet_sightings(fleet, solved.association))
+    solved = replace(solved, sightings=fleet_sightings(fleet, solved.association))
+    return replace(solved, state=solved_state(full_graph(solved), solved.state))
 
 
 def full_graph(solved: Solved, *, with_labels: bool = True) -> gtsam.NonlinearFactorGraph:
