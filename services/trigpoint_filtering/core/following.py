@@ -21,7 +21,7 @@ ORIGIN = Pose2(0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class Following:
-    """What stays the same along a track: whose it is, its geometry, estimator, settings and gate limit."""
+    """What stays the same along a track: whose it is, its geometry, estimator, settings, gate limit and track width."""
 
     vehicle: str
     boot_id: str
@@ -29,6 +29,7 @@ class Following:
     estimator: Estimator
     settings: FilterSettings
     limit: float
+    track_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +62,7 @@ def started_track(described: VehicleDescribed, *, boot_id: str, point_scale: flo
     """The track of a vehicle that has measured nothing yet."""
     geometry = geometry_of(described, point_scale=point_scale)
     limit = float(chi2.ppf(settings.gate_probability, 2))
-    following = Following(described.vehicle, boot_id, geometry, Estimator(geometry), settings, limit)
+    following = Following(described.vehicle, boot_id, geometry, Estimator(geometry), settings, limit, described.track_m)
     return Track(following, Odometer(described.wheelbase_m > 0.0), gnss_noise(math.nan, settings), Seeker(ORIGIN))
 
 

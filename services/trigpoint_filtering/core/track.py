@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from trigpoint.errors import FrameRefused
 from trigpoint.events.drives import Drive
 from trigpoint.events.estimated import FixJudged, GateAlarmed
 from trigpoint.geodesy.poses import wrap_angles_rad
@@ -144,8 +145,20 @@ def _imu_rows(drive: Drive) -> Iterator[tuple[float, ...]]:
 
 def _fix_rows(drive: Drive, frame: MapFrame) -> Iterator[tuple[float, ...]]:
     fixes = drive.fixes
-    point_m = map_points_from_wgs84(fixes.lat_deg, fixes.lon_deg, frame)
+    point_m = _placed_points(fixes.lat_deg, fixes.lon_deg, frame)
     return _rows(point_m[:, 0], point_m[:, 1], fixes.stamp_ns, fixes.sigma_m, fixes.sequence)
+
+
+def _placed_points(lat_deg: Floats, lon_deg: Floats, frame: MapFrame) -> Floats:
+    """Fixes (n, 2) in the map frame; NaN where the projection does not reach, which no gate lets pass."""
+    try:
+        return map_points_from_wgs84(lat_deg, lon_deg, frame)
+    except FrameRefused:
+        if len(lat_deg) == 1:
+            return np.full((1, 2), np.nan)
+        half = len(lat_deg) // 2
+        parts = (slice(None, half), slice(half, None))
+        return np.concatenate([_placed_points(lat_deg[part], lon_deg[part], frame) for part in parts])
 
 
 @dataclass(slots=True)

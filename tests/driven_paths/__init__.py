@@ -1,0 +1,1 @@
+"""Drives along known paths, for tests of what follows them."""
