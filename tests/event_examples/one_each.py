@@ -22,7 +22,14 @@ from trigpoint.events.observed import (
 )
 
 EVENTS: tuple[Event, ...] = (
-    VehicleDescribed(vehicle="van", wheelbase_m=2.83, antenna_x_m=3.77, declared_crs="EPSG:32756", software="logger 3"),
+    VehicleDescribed(
+        vehicle="van",
+        wheelbase_m=2.83,
+        antenna_x_m=3.77,
+        landmark_sensor_model="camera",
+        declared_crs="EPSG:32756",
+        software="logger 3",
+    ),
     WheelSpeedMeasured(speed_mps=5.0, steering_rad=0.1, yaw_rate_radps=math.nan),
     WheelPairMeasured(left_mps=1.0, right_mps=1.1),
     ImuMeasured(yaw_rate_radps=0.02, acceleration_x_mps2=math.nan, acceleration_y_mps2=-0.3),

@@ -24,7 +24,7 @@ _sym_db = _symbol_database.Default()
 
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n#trigpoint_schemas/v1/observed.proto\x12\x0ctrigpoint.v1\"\xf7\x02\n\x10VehicleDescribed\x12\x0f\n\x07vehicle\x18\x01 \x01(\t\x12\x13\n\x0bwheelbase_m\x18\x02 \x01(\x01\x12\x0f\n\x07track_m\x18\x03 \x01(\x01\x12\x17\n\x0fspeed_wheel_y_m\x18\x04 \x01(\x01\x12\x13\n\x0b\x61ntenna_x_m\x18\x05 \x01(\x01\x12\x13\n\x0b\x61ntenna_y_m\x18\x06 \x01(\x01\x12\x1b\n\x13landmark_sensor_x_m\x18\x07 \x01(\x01\x12\x1b\n\x13landmark_sensor_y_m\x18\x08 \x01(\x01\x12\x1f\n\x17landmark_sensor_yaw_rad\x18\t \x01(\x01\x12\x1f\n\x17landmark_sensor_range_m\x18\n \x01(\x01\x12\x14\n\x0c\x64\x65\x63lared_crs\x18\x0b \x01(\t\x12!\n\x19\x64\x65\x63lared_origin_easting_m\x18\x0c \x01(\x01\x12\"\n\x1a\x64\x65\x63lared_origin_northing_m\x18\r \x01(\x01\x12\x10\n\x08software\x18\x0e \x01(\t\"U\n\x12WheelSpeedMeasured\x12\x11\n\tspeed_mps\x18\x01 \x01(\x01\x12\x14\n\x0csteering_rad\x18\x02 \x01(\x01\x12\x16\n\x0eyaw_rate_radps\x18\x03 \x01(\x01\"8\n\x11WheelPairMeasured\x12\x10\n\x08left_mps\x18\x01 \x01(\x01\x12\x11\n\tright_mps\x18\x02 \x01(\x01\"_\n\x0bImuMeasured\x12\x16\n\x0eyaw_rate_radps\x18\x01 \x01(\x01\x12\x1b\n\x13\x61\x63\x63\x65leration_x_mps2\x18\x02 \x01(\x01\x12\x1b\n\x13\x61\x63\x63\x65leration_y_mps2\x18\x03 \x01(\x01\"n\n\x11LandmarkDetection\x12\x0f\n\x07range_m\x18\x01 \x01(\x01\x12\x13\n\x0b\x62\x65\x61ring_rad\x18\x02 \x01(\x01\x12\x0c\n\x04kind\x18\x03 \x01(\t\x12\x11\n\tsignature\x18\x04 \x01(\t\x12\x12\n\ndiameter_m\x18\x05 \x01(\x01\"H\n\x11LandmarksDetected\x12\x33\n\ndetections\x18\x01 \x03(\x0b\x32\x1f.trigpoint.v1.LandmarkDetection\"d\n\x0c\x45ventRefused\x12\x0e\n\x06source\x18\x01 \x01(\t\x12\x0e\n\x06reason\x18\x02 \x01(\t\x12\x0e\n\x06\x64\x65tail\x18\x03 \x01(\t\x12\x13\n\x0bschema_name\x18\x04 \x01(\t\x12\x0f\n\x07payload\x18\x05 \x01(\x0c\"g\n\x0eMapFramePinned\x12\x0b\n\x03\x63rs\x18\x01 \x01(\t\x12\x18\n\x10origin_easting_m\x18\x02 \x01(\x01\x12\x19\n\x11origin_northing_m\x18\x03 \x01(\x01\x12\x13\n\x0b\x64\x65\x63lared_by\x18\x04 \x01(\tb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n#trigpoint_schemas/v1/observed.proto\x12\x0ctrigpoint.v1\"\x96\x03\n\x10VehicleDescribed\x12\x0f\n\x07vehicle\x18\x01 \x01(\t\x12\x13\n\x0bwheelbase_m\x18\x02 \x01(\x01\x12\x0f\n\x07track_m\x18\x03 \x01(\x01\x12\x17\n\x0fspeed_wheel_y_m\x18\x04 \x01(\x01\x12\x13\n\x0b\x61ntenna_x_m\x18\x05 \x01(\x01\x12\x13\n\x0b\x61ntenna_y_m\x18\x06 \x01(\x01\x12\x1b\n\x13landmark_sensor_x_m\x18\x07 \x01(\x01\x12\x1b\n\x13landmark_sensor_y_m\x18\x08 \x01(\x01\x12\x1f\n\x17landmark_sensor_yaw_rad\x18\t \x01(\x01\x12\x1f\n\x17landmark_sensor_range_m\x18\n \x01(\x01\x12\x14\n\x0c\x64\x65\x63lared_crs\x18\x0b \x01(\t\x12!\n\x19\x64\x65\x63lared_origin_easting_m\x18\x0c \x01(\x01\x12\"\n\x1a\x64\x65\x63lared_origin_northing_m\x18\r \x01(\x01\x12\x10\n\x08software\x18\x0e \x01(\t\x12\x1d\n\x15landmark_sensor_model\x18\x0f \x01(\t\"U\n\x12WheelSpeedMeasured\x12\x11\n\tspeed_mps\x18\x01 \x01(\x01\x12\x14\n\x0csteering_rad\x18\x02 \x01(\x01\x12\x16\n\x0eyaw_rate_radps\x18\x03 \x01(\x01\"8\n\x11WheelPairMeasured\x12\x10\n\x08left_mps\x18\x01 \x01(\x01\x12\x11\n\tright_mps\x18\x02 \x01(\x01\"_\n\x0bImuMeasured\x12\x16\n\x0eyaw_rate_radps\x18\x01 \x01(\x01\x12\x1b\n\x13\x61\x63\x63\x65leration_x_mps2\x18\x02 \x01(\x01\x12\x1b\n\x13\x61\x63\x63\x65leration_y_mps2\x18\x03 \x01(\x01\"n\n\x11LandmarkDetection\x12\x0f\n\x07range_m\x18\x01 \x01(\x01\x12\x13\n\x0b\x62\x65\x61ring_rad\x18\x02 \x01(\x01\x12\x0c\n\x04kind\x18\x03 \x01(\t\x12\x11\n\tsignature\x18\x04 \x01(\t\x12\x12\n\ndiameter_m\x18\x05 \x01(\x01\"H\n\x11LandmarksDetected\x12\x33\n\ndetections\x18\x01 \x03(\x0b\x32\x1f.trigpoint.v1.LandmarkDetection\"d\n\x0c\x45ventRefused\x12\x0e\n\x06source\x18\x01 \x01(\t\x12\x0e\n\x06reason\x18\x02 \x01(\t\x12\x0e\n\x06\x64\x65tail\x18\x03 \x01(\t\x12\x13\n\x0bschema_name\x18\x04 \x01(\t\x12\x0f\n\x07payload\x18\x05 \x01(\x0c\"g\n\x0eMapFramePinned\x12\x0b\n\x03\x63rs\x18\x01 \x01(\t\x12\x18\n\x10origin_easting_m\x18\x02 \x01(\x01\x12\x19\n\x11origin_northing_m\x18\x03 \x01(\x01\x12\x13\n\x0b\x64\x65\x63lared_by\x18\x04 \x01(\tb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -32,19 +32,19 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'trigpoint_schemas.v1.observ
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_VEHICLEDESCRIBED']._serialized_start=54
-  _globals['_VEHICLEDESCRIBED']._serialized_end=429
-  _globals['_WHEELSPEEDMEASURED']._serialized_start=431
-  _globals['_WHEELSPEEDMEASURED']._serialized_end=516
-  _globals['_WHEELPAIRMEASURED']._serialized_start=518
-  _globals['_WHEELPAIRMEASURED']._serialized_end=574
-  _globals['_IMUMEASURED']._serialized_start=576
-  _globals['_IMUMEASURED']._serialized_end=671
-  _globals['_LANDMARKDETECTION']._serialized_start=673
-  _globals['_LANDMARKDETECTION']._serialized_end=783
-  _globals['_LANDMARKSDETECTED']._serialized_start=785
-  _globals['_LANDMARKSDETECTED']._serialized_end=857
-  _globals['_EVENTREFUSED']._serialized_start=859
-  _globals['_EVENTREFUSED']._serialized_end=959
-  _globals['_MAPFRAMEPINNED']._serialized_start=961
-  _globals['_MAPFRAMEPINNED']._serialized_end=1064
+  _globals['_VEHICLEDESCRIBED']._serialized_end=460
+  _globals['_WHEELSPEEDMEASURED']._serialized_start=462
+  _globals['_WHEELSPEEDMEASURED']._serialized_end=547
+  _globals['_WHEELPAIRMEASURED']._serialized_start=549
+  _globals['_WHEELPAIRMEASURED']._serialized_end=605
+  _globals['_IMUMEASURED']._serialized_start=607
+  _globals['_IMUMEASURED']._serialized_end=702
+  _globals['_LANDMARKDETECTION']._serialized_start=704
+  _globals['_LANDMARKDETECTION']._serialized_end=814
+  _globals['_LANDMARKSDETECTED']._serialized_start=816
+  _globals['_LANDMARKSDETECTED']._serialized_end=888
+  _globals['_EVENTREFUSED']._serialized_start=890
+  _globals['_EVENTREFUSED']._serialized_end=990
+  _globals['_MAPFRAMEPINNED']._serialized_start=992
+  _globals['_MAPFRAMEPINNED']._serialized_end=1095
 # @@protoc_insertion_point(module_scope)

@@ -7,7 +7,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class VehicleDescribed(_message.Message):
-    __slots__ = ("vehicle", "wheelbase_m", "track_m", "speed_wheel_y_m", "antenna_x_m", "antenna_y_m", "landmark_sensor_x_m", "landmark_sensor_y_m", "landmark_sensor_yaw_rad", "landmark_sensor_range_m", "declared_crs", "declared_origin_easting_m", "declared_origin_northing_m", "software")
+    __slots__ = ("vehicle", "wheelbase_m", "track_m", "speed_wheel_y_m", "antenna_x_m", "antenna_y_m", "landmark_sensor_x_m", "landmark_sensor_y_m", "landmark_sensor_yaw_rad", "landmark_sensor_range_m", "declared_crs", "declared_origin_easting_m", "declared_origin_northing_m", "software", "landmark_sensor_model")
     VEHICLE_FIELD_NUMBER: _ClassVar[int]
     WHEELBASE_M_FIELD_NUMBER: _ClassVar[int]
     TRACK_M_FIELD_NUMBER: _ClassVar[int]
@@ -22,6 +22,7 @@ class VehicleDescribed(_message.Message):
     DECLARED_ORIGIN_EASTING_M_FIELD_NUMBER: _ClassVar[int]
     DECLARED_ORIGIN_NORTHING_M_FIELD_NUMBER: _ClassVar[int]
     SOFTWARE_FIELD_NUMBER: _ClassVar[int]
+    LANDMARK_SENSOR_MODEL_FIELD_NUMBER: _ClassVar[int]
     vehicle: str
     wheelbase_m: float
     track_m: float
@@ -36,7 +37,8 @@ class VehicleDescribed(_message.Message):
     declared_origin_easting_m: float
     declared_origin_northing_m: float
     software: str
-    def __init__(self, vehicle: _Optional[str] = ..., wheelbase_m: _Optional[float] = ..., track_m: _Optional[float] = ..., speed_wheel_y_m: _Optional[float] = ..., antenna_x_m: _Optional[float] = ..., antenna_y_m: _Optional[float] = ..., landmark_sensor_x_m: _Optional[float] = ..., landmark_sensor_y_m: _Optional[float] = ..., landmark_sensor_yaw_rad: _Optional[float] = ..., landmark_sensor_range_m: _Optional[float] = ..., declared_crs: _Optional[str] = ..., declared_origin_easting_m: _Optional[float] = ..., declared_origin_northing_m: _Optional[float] = ..., software: _Optional[str] = ...) -> None: ...
+    landmark_sensor_model: str
+    def __init__(self, vehicle: _Optional[str] = ..., wheelbase_m: _Optional[float] = ..., track_m: _Optional[float] = ..., speed_wheel_y_m: _Optional[float] = ..., antenna_x_m: _Optional[float] = ..., antenna_y_m: _Optional[float] = ..., landmark_sensor_x_m: _Optional[float] = ..., landmark_sensor_y_m: _Optional[float] = ..., landmark_sensor_yaw_rad: _Optional[float] = ..., landmark_sensor_range_m: _Optional[float] = ..., declared_crs: _Optional[str] = ..., declared_origin_easting_m: _Optional[float] = ..., declared_origin_northing_m: _Optional[float] = ..., software: _Optional[str] = ..., landmark_sensor_model: _Optional[str] = ...) -> None: ...
 
 class WheelSpeedMeasured(_message.Message):
     __slots__ = ("speed_mps", "steering_rad", "yaw_rate_radps")

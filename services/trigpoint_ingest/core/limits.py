@@ -157,6 +157,7 @@ def _require_texts(**texts: str) -> None:
 
 def _require_description(event: VehicleDescribed) -> None:
     _require_texts(vehicle=event.vehicle, software=event.software, declared_crs=event.declared_crs)
+    _require_texts(landmark_sensor_model=event.landmark_sensor_model)
     if event.declared_crs:
         try:
             frame_of_description(event)

@@ -120,6 +120,7 @@ def _sightings(source: SourceText, subjects: _Subjects) -> tuple[list[Timed], in
 def _described(robot: int) -> VehicleDescribed:
     return VehicleDescribed(
         vehicle=f"robot{robot}",
+        landmark_sensor_model="camera",  # ranges come from the height of barcodes in the image
         declared_crs=CRS,
         declared_origin_easting_m=ORIGIN.easting_m,
         declared_origin_northing_m=ORIGIN.northing_m,

@@ -248,6 +248,7 @@ class Geometry(ManifestPart):
     landmark_sensor_y_m: float = 0.0
     landmark_sensor_yaw_rad: float = 0.0
     landmark_sensor_range_m: float = 0.0
+    landmark_sensor_model: Literal["", "camera"] = ""
 
 
 class Vehicle(ManifestPart):

@@ -10,6 +10,8 @@ class VehicleDescribed:
 
     `steering` turns into yaw rate by `wheelbase_m` where wheels report steering; `track_m` where they report
     left and right. `speed_wheel_y_m` is where the wheel that measures speed runs. `*_sigma` 0 means unknown.
+    `landmark_sensor_model` is "camera" where ranges come from the image (an error in proportion to the range, and
+    depth rather than range), empty where they are measured, as by a lidar.
     `declared_crs` and `declared_origin_*` place a local metric frame when the source has no other reference
     (empty and 0 otherwise).
     """
@@ -24,6 +26,7 @@ class VehicleDescribed:
     landmark_sensor_y_m: float = 0.0
     landmark_sensor_yaw_rad: float = 0.0
     landmark_sensor_range_m: float = 0.0
+    landmark_sensor_model: str = ""
     declared_crs: str = ""
     declared_origin_easting_m: float = 0.0
     declared_origin_northing_m: float = 0.0
