@@ -2,20 +2,15 @@
 
 import socket
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import cast
 
 from trigpoint.bus.zenoh_bus import ZenohBus, ZenohSettings
-from trigpoint.events.codec import decode
-from trigpoint.events.envelope import Envelope
-from trigpoint.events.observed import Observed
 from trigpoint.logs.ports import EventLog
-from trigpoint.logs.vehicle_log import read_vehicle_log
 from trigpoint_ingest.app import IngestService
 from trigpoint_ingest.core.tally import IngestReport
 from trigpoint_ingest.settings import IngestSettings
-from trigpoint_vehicle.replay import replay_rows
+from trigpoint_vehicle.replay import replay_log
 
 IDLE_S = 0.02  # how long ingest waits for a message before it looks whether the drives are over
 LOOPBACK = "127.0.0.1"
@@ -35,14 +30,9 @@ class _Replaying(threading.Thread):
         try:
             with ZenohBus(ZenohSettings(connect=(self._endpoint,))) as bus:
                 for path in self._paths:
-                    replay_rows(_rows(path), bus, progress=self._progress)
+                    replay_log(path, bus, progress=self._progress)
         except Exception as error:  # carried to the thread that waits for this one, and raised there
             self.error = error
-
-
-def _rows(path: Path) -> Iterator[Envelope[Observed]]:
-    for message in read_vehicle_log(path):
-        yield Envelope(message.identity, message.stamp_ns, cast(Observed, decode(message.schema_name, message.payload)))
 
 
 def free_endpoint() -> str:

@@ -49,6 +49,12 @@ def read_inputs(log: EventLog, screen: Screen) -> Inputs:
     return Inputs(frame=frame, drives=drives, anchors=logged_anchors(log))
 
 
+def inputs_of(solution: Solution, log: EventLog) -> Inputs:
+    """What a solution was just made from: its drives are not read again."""
+    drives = tuple(prepared.drive for prepared in solution.solved.fleet.prepared)
+    return Inputs(frame=logged_frame(log), drives=drives, anchors=logged_anchors(log))
+
+
 def settings_for(
     method: Method | None,
     anchors: Sequence[AnchorLabelled],

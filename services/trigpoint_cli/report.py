@@ -14,7 +14,7 @@ from trigpoint.events.solved import LabelReduction, SolvedMap
 from trigpoint.logs.ports import EventLog
 from trigpoint_cli.data_dir import DataDirectory, data_option
 from trigpoint_cli.output import Answer, Screen, answering
-from trigpoint_cli.pipeline import read_inputs, settings_for, solve
+from trigpoint_cli.pipeline import inputs_of, read_inputs, settings_for, solve
 from trigpoint_evaluation.app import (
     Evaluated,
     TruthEvaluation,
@@ -36,7 +36,7 @@ from trigpoint_evaluation.report.content import LeaveOutCurves, ReportContent, U
 from trigpoint_evaluation.report.page import report_page
 from trigpoint_optimisation.core.solve import Solution
 
-CURVE_DRAWS = 200  # for every number of tied labels: enough for a smooth band
+CURVE_DRAWS = 100  # for every number of tied labels: enough for a smooth band
 SOFTWARE = ("trigpoint", "gtsam", "filterpy", "numpy", "scipy", "pyproj", "mcap", "eclipse-zenoh", "matplotlib")
 
 
@@ -65,8 +65,8 @@ def write_report(
 
     `solution` is the newest map version's where it was just solved; else it is solved again for its held-out anchors.
     """
-    solved = logged_map(log)
-    inputs, estimates = read_inputs(log, screen), logged_estimates(log)
+    solved, estimates = logged_map(log), logged_estimates(log)
+    inputs = read_inputs(log, screen) if solution is None else inputs_of(solution, log)
     if solution is None and inputs.anchors:
         settings = settings_for("anchored", inputs.anchors)
         solution = solve(inputs, settings, screen, verdicts=estimates.verdicts, what="solving for held-out anchors")
