@@ -1,6 +1,5 @@
 """The whole solve: odometry and fixes, then landmarks, then anchors; each stage starts from the converged one before."""
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -43,6 +42,7 @@ from trigpoint_optimisation.core.fleet import (
 from trigpoint_optimisation.core.georeferencing import georeferenced
 from trigpoint_optimisation.core.graph import add_labels, add_sightings
 from trigpoint_optimisation.core.marginals import Reduced, covariance_of, reduced
+from trigpoint_optimisation.core.rigid import rigid_graph, rigid_state
 from trigpoint_optimisation.core.sightings import Sightings
 from trigpoint_optimisation.core.state import MapState, image_key, landmark_key, values_of
 from trigpoint_optimisation.settings import SolveSettings
@@ -87,6 +87,9 @@ def solve_fleet(
     fleet = prepared_fleet(drives, frame, settings, allowed=masks)
     fleet, state = georeferenced(fleet, progress=progress)
     solved = _with_landmarks(fleet, state, progress)
+    if settings.method == "rigid":
+        landmark = solved.association.landmark_of_track[solved.sightings.track]
+        return replace(solved, state=rigid_state(solved.fleet, solved.state, solved.sightings, landmark))
     if settings.method == "anchored":
         solved = anchored(solved, labels_of(anchors, frame, image_offsets=settings.image_offsets), progress=progress)
     return solved
@@ -131,10 +134,18 @@ def _with_landmarks(fleet: Fleet, state: MapState, progress: Progress) -> Solved
     return replace(solved, state=solved_state(full_graph(solved), solved.state))
 
 
+def with_fix_bias(state: MapState) -> bool:
+    """Whether slow errors of fixes are among the states: a rigidly aligned map has let go of its fixes."""
+    return any(len(drive.fix_bias_m) for drive in state.drives)
+
+
 def full_graph(solved: Solved, *, with_labels: bool = True) -> gtsam.NonlinearFactorGraph:
     """The graph of a solve: odometry, fixes, landmarks, and labels if wanted; kernels on fixes, landmarks, labels."""
-    settings, graph = solved.fleet.settings, georeferenced_graph(solved.fleet, robust=True)
+    settings = solved.fleet.settings
     landmark = solved.association.landmark_of_track[solved.sightings.track]
+    if settings.method == "rigid" and not with_fix_bias(solved.state):
+        return rigid_graph(solved.fleet, solved.state, solved.sightings, landmark)
+    graph = georeferenced_graph(solved.fleet, robust=True)
     add_sightings(graph, solved.sightings, landmark, cauchy_scale=settings.detections.cauchy_scale)
     if with_labels:
         tied, _ = tied_labels(solved.labels, solved.assignment)
