@@ -56,8 +56,7 @@ class Driven:
 
     def fix_s(self) -> Floats:
         """Seconds of each fix after the start."""
-        seconds: Floats = (self.drive.fixes.stamp_ns - START_NS) * 1e-9
-        return seconds
+        return np.asarray((self.drive.fixes.stamp_ns - START_NS) * 1e-9, dtype=np.float64)
 
     def pose_at(self, stamp_ns: NDArray[np.int64]) -> Floats:
         """True poses (m, 3) at stamps."""
@@ -69,7 +68,9 @@ class Driven:
         lat_deg, lon_deg = self.drive.fixes.lat_deg.copy(), self.drive.fixes.lon_deg.copy()
         antenna_m = transform_points(self.pose_at(self.drive.fixes.stamp_ns), ANTENNA_M[None, :])
         lat_deg[chosen], lon_deg[chosen] = wgs84_from_map_points(antenna_m[chosen] + shift_m, FRAME)
-        return replace(self, drive=replace(self.drive, fixes=replace(self.drive.fixes, lat_deg=lat_deg, lon_deg=lon_deg)))
+        return replace(
+            self, drive=replace(self.drive, fixes=replace(self.drive.fixes, lat_deg=lat_deg, lon_deg=lon_deg))
+        )
 
     def with_fixes(self, chosen: NDArray[np.bool_]) -> "Driven":
         """The same drive with the chosen fixes only."""

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from driven_paths.examples import FRAME, Course, Driven, driven
 
+from driven_paths.examples import FRAME, Course, Driven, driven
 from trigpoint_filtering.core.estimator import Belief, Estimator, GnssNoise
 from trigpoint_filtering.core.gate import Fix, Hypothesis, in_outage, judged
 from trigpoint_filtering.core.motion import Geometry

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from driven_paths.examples import FRAME, START_NS, Course, Driven, driven
 
+from driven_paths.examples import FRAME, START_NS, Course, Driven, driven
 from trigpoint.geodesy.poses import wrap_angles_rad
 from trigpoint_filtering.core.track import FilteredDrive, filter_drive
 from trigpoint_filtering.settings import FilterSettings
