@@ -1,5 +1,6 @@
 """The charts: NIS over time, residuals before and after, and what anchors not tied would have cost."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -38,13 +39,20 @@ def nis_svg(name: str, judged: JudgedFixes) -> str:
         _draw_gate(axes, judged, minute, known)
         axes.set_yscale("log")
         axes.minorticks_off()
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _power_of_ten(value)))
         axes.set_xlabel("time since the first fix (min)")
         axes.set_ylabel("NIS (2 degrees of freedom)")
         axes.set_xlim(0.0, float(minute[-1]) if len(minute) else 1.0)
         figure.legend(loc="outside upper left", ncols=5, handlelength=1.4, columnspacing=1.4)
 
     return drawn_svg(name, WIDE_IN, draw)
+
+
+def _power_of_ten(value: float) -> str:
+    """0.01 to 1000 in full, beyond as 10⁴."""
+    exponent = round(math.log10(value))
+    superscript = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+    return f"{value:g}" if -3 < exponent < 4 else "10" + f"{exponent}".translate(superscript)
 
 
 def _draw_gate(axes: Axes, judged: JudgedFixes, minute: Floats, known: NDArray[np.bool_]) -> None:

@@ -79,6 +79,6 @@ def _themed(document: str, name: str) -> str:
     for colour, variable in VARIABLES.items():
         element = element.replace(colour, f"var({variable})")
     element = element.replace("'DejaVu Sans'", "var(--sans)")
-    for prefix in ("figure_", "axes_", "patch_", "line2d_", "text_", "matplotlib.axis_"):
-        element = element.replace(f'id="{prefix}', f'id="{name}-{prefix}')
+    for before in ('id="', 'href="#', "url(#"):
+        element = element.replace(before, f"{before}{name}-")
     return element

@@ -20,12 +20,16 @@ DETAIL_LIMIT = 140  # characters of a refusal's detail
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table: a line above it, column heads, rows of text; numbers are set flush right from column `numeric` on."""
+    """A table: a line below it, column heads, rows of text; numbers are set flush right from column `numeric` on.
+
+    One with a `fold` stands folded away behind these words.
+    """
 
     caption: str
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     numeric: int = 1
+    fold: str = ""
 
 
 def number(value: float, digits: int = 2) -> str:
@@ -59,13 +63,16 @@ def vehicle_table(drives: Sequence[DrivePicture]) -> Table:
 
 def calibration_table(drives: Sequence[DrivePicture]) -> Table:
     """The calibration states each drive was solved with."""
-    rows = [
-        (drive.vehicle, name, number(value, 4), number(sigma, 4))
-        for drive in drives
-        if drive.solved is not None
-        for name, value, sigma in drive.solved.calibration
-    ]
-    return Table("Unit: as the name ends; scales without.", ("vehicle", "state", "value", "1-sigma"), tuple(rows), 2)
+    solved = [drive.solved for drive in drives if drive.solved is not None]
+    states = list(dict.fromkeys(name for one in solved for name, _, _ in one.calibration))
+    known = [{name: _with_sigma(value, sigma) for name, value, sigma in one.calibration} for one in solved]
+    rows = tuple((state, *(values.get(state, "–") for values in known)) for state in states)
+    caption = "Unit: as the name ends; scales without. After ± 1-sigma, where it was computed."
+    return Table(caption, ("calibration", *(one.vehicle for one in solved)), rows)
+
+
+def _with_sigma(value: float, sigma: float) -> str:
+    return number(value, 4) + (f" ± {number(sigma, 4)}" if math.isfinite(sigma) else "")
 
 
 def image_table(content: ReportContent) -> Table:
@@ -168,7 +175,13 @@ def settings_table(content: ReportContent) -> Table:
     rows = [("method", head.method), ("solved in", f"{number(head.wall_s, 1)} s")]
     rows += _flattened(json.loads(head.settings_json or "{}"))
     rows += [(f"log stream {stream}", f"{count} events") for stream, count in head.inputs]
-    return Table("The map can be solved again from these log positions and settings.", ("setting", ""), tuple(rows), 2)
+    return Table(
+        "The map can be solved again from these log positions and settings.",
+        ("setting", ""),
+        tuple(rows),
+        2,
+        "Settings and log positions",
+    )
 
 
 def _flattened(settings: object, prefix: str = "") -> list[tuple[str, str]]:
@@ -182,7 +195,7 @@ def _flattened(settings: object, prefix: str = "") -> list[tuple[str, str]]:
 
 def version_table(content: ReportContent) -> Table:
     """The software."""
-    return Table("", ("software", "version"), content.versions, 2)
+    return Table("", ("software", "version"), content.versions, 2, "Versions of the software")
 
 
 def dates_of(drives: Sequence[DrivePicture]) -> str:
