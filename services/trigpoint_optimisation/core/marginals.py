@@ -50,7 +50,10 @@ def pose_covariances(graph: gtsam.NonlinearFactorGraph, values: gtsam.Values, ke
 
 
 def covariance_of(kept: Reduced) -> Floats:
-    """The covariance (2m, 2m) of a reduction. Raises AlignmentRefused where the data leave the kept states undetermined."""
+    """The covariance (2m, 2m) of a reduction.
+
+    Raises AlignmentRefused where the data leave the kept states undetermined.
+    """
     try:
         factor = np.linalg.cholesky(kept.information)
     except np.linalg.LinAlgError as error:

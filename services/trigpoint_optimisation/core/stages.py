@@ -1,4 +1,4 @@
-"""The whole solve: odometry and fixes, then landmarks, then anchors; each stage starts from the converged one before."""
+"""The whole solve: odometry and fixes, then landmarks, then anchors; each from the converged one before."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -216,7 +216,9 @@ def _expected_sigma(solved: Solved) -> Floats:
     expected = labels.label_m - np.vstack([solved.state.image_m, np.zeros((1, 2))])[labels.image]
     distance = np.hypot(*(expected[:, None, :] - solved.state.landmark_m[None, :, :]).transpose(2, 0, 1))
     image = np.append(variance[count:], 0.0)[labels.image]
-    return np.sqrt(variance[:count][distance.argmin(axis=1)] + image + labels.sigma_m**2)
+    expected_m2 = variance[:count][distance.argmin(axis=1)] + image + labels.sigma_m**2
+    sigma_m: Floats = np.sqrt(expected_m2)
+    return sigma_m
 
 
 def _residual_sigma(solved: Solved) -> Floats:

@@ -57,7 +57,8 @@ SHARED_KINDS = frozenset("cabos")
 
 def shared_keys(values: gtsam.Values) -> list[int]:
     """The keys of states that many factors share: calibrations, lever arms, image offsets."""
-    return [key for key in values.keys() if chr(gtsam.Symbol(key).chr()) in SHARED_KINDS]
+    keys = values.keys()
+    return [key for key in keys if chr(gtsam.Symbol(key).chr()) in SHARED_KINDS]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

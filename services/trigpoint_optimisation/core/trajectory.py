@@ -32,7 +32,7 @@ def poses_at(prepared: PreparedDrive, pose: Floats, stamp_ns: Ints) -> Floats:
     share = np.where(moved > 1e-3, np.hypot(*(here - start)[:, :2].T) / np.maximum(moved, 1e-3), by_time)[:, None]
     turn = wrap_angles_rad(from_after - from_before)[:, 2:]
     step = np.column_stack([(from_after - from_before)[:, :2], turn])
-    blended = from_before + share * step
+    blended: Floats = from_before + share * step
     blended[:, 2] = wrap_angles_rad(blended[:, 2])
     return blended
 
