@@ -47,6 +47,11 @@ class DataDirectory:
         return self.path / "truth" / "truth.csv"
 
     @property
+    def solves(self) -> Path:
+        """What builds kept so that measuring them needs no second solve."""
+        return self.path / "solves"
+
+    @property
     def vehicles(self) -> Path:
         """The vehicles' own logs."""
         return self.path / "vehicles"

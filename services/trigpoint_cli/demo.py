@@ -52,7 +52,7 @@ def command(out: Path, seed: int, vehicles: int, *, screen: Screen) -> Answer:
             ingested = ingest_live(logs, log, progress)
         import_anchors(read_anchor_file(data.anchors), log)
         built = build_map(data, log, screen, method="anchored")
-        found = write_report(data, log, screen, truth_path=data.truth, solution=built.solution)
+        found = write_report(data, log, screen, truth_path=data.truth, built=built)
     assert found is not None, "truth was written above"
     return _answer(_Driven(data=data, ingest=ingested, built=built), found)
 
@@ -84,7 +84,7 @@ def _emptied(out: Path) -> DataDirectory:
     if out.is_dir() and any(out.iterdir()) and not mark.is_file():
         raise InputError(f"{out}: the directory is not empty and not a demonstration's; choose another --out")
     try:
-        for made in (data.log, data.vehicles, data.truth.parent):
+        for made in (data.log, data.vehicles, data.solves, data.truth.parent):
             shutil.rmtree(made, ignore_errors=True)
         for file in (data.report, data.anchors, *out.glob(f"{data.database.name}*")):
             file.unlink(missing_ok=True)

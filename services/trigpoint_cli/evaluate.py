@@ -7,12 +7,16 @@ import click
 
 from trigpoint.errors import InputError
 from trigpoint.events.mapped import TrajectorySolved
+from trigpoint.events.solved import LabelReduction
+from trigpoint.logs.ports import EventLog
+from trigpoint.logs.readings import logged_maps, logged_verdicts
 from trigpoint_cli.build import EDGES, METHODS, edges_of
 from trigpoint_cli.data_dir import DataDirectory, data_option
+from trigpoint_cli.kept_solves import joint_covariance_m2, kept_solve
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering, metres
 from trigpoint_cli.pipeline import Inputs, filter_drives, read_inputs, settings_for, solve, verdicts_of
 from trigpoint_cli.truth_values import truth_lines, truth_values
-from trigpoint_evaluation.app import Evaluated, evaluate_truth, logged_estimates, logged_map, read_truth
+from trigpoint_evaluation.app import Evaluated, evaluate_truth, logged_map, read_truth
 from trigpoint_evaluation.core.draws import LeaveOutDraws, LeaveOutResult, left_out, left_out_curve
 from trigpoint_evaluation.core.gnss import (
     FilteredPath,
@@ -128,12 +132,13 @@ def leave_out(
     screen: Screen,
     **draws: int,
 ) -> Answer:
-    """Tie N anchors, measure the others: label minus landmark minus image offset, over K draws."""
+    """Tie N anchors, measure the others: label minus landmark minus image offset, over K draws.
+
+    Of the newest map version if it is anchored; else, or with --known-association, of one solved for this alone.
+    """
     settings = LeaveOutDraws(draws=draws["draws"], seed=draws["seed"], blocked=bool(draws["blocked"]))
     with data.opened_log() as log:
-        inputs, verdicts = read_inputs(log, screen), logged_estimates(log).verdicts
-    chosen = settings_for("anchored", inputs.anchors, known_association=known_association)
-    reduction = solve(inputs, chosen, screen, verdicts=verdicts).reduction()
+        reduction = _reduction(data, log, screen, known_association=known_association)
     results: tuple[LeaveOutResult, ...]
     if tied is not None:
         results = (left_out(reduction, tied, settings, image=image),)
@@ -146,6 +151,18 @@ def leave_out(
     if tied is None:
         values["curve"] = [_leave_out_values(result) for result in results]
     return Answer(values, tuple(map(_leave_out_line, results)))
+
+
+def _reduction(data: DataDirectory, log: EventLog, screen: Screen, *, known_association: bool) -> LabelReduction:
+    """The newest map version's, as its build kept it; else of a solve now: anchored, from all the log holds."""
+    maps = logged_maps(log)
+    if maps and maps[-1].head.method == "anchored" and not known_association:
+        kept = kept_solve(data, maps[-1].head.map_version)
+        if kept is not None:
+            return kept.reduction
+    inputs = read_inputs(log, screen)
+    settings = settings_for("anchored", inputs.anchors, known_association=known_association)
+    return solve(inputs, settings, screen, verdicts=logged_verdicts(log)).reduction()
 
 
 def _leave_out_values(result: LeaveOutResult) -> JsonObject:
@@ -175,10 +192,11 @@ def truth(data: DataDirectory, truth_path: Path, *, screen: Screen) -> Answer:
     """Measure the newest map version against truth; nothing is aligned first."""
     known = read_truth(truth_path)
     with data.opened_log() as log:
-        solved, verdicts = logged_map(log), logged_estimates(log).verdicts
+        solved, verdicts = logged_map(log), logged_verdicts(log)
         inputs = read_inputs(log, screen)
     evaluated = Evaluated(solved=solved, frame=inputs.frame, drives=inputs.drives, verdicts=verdicts)
-    found = evaluate_truth(evaluated, known)
+    joint_m2 = joint_covariance_m2(kept_solve(data, solved.head.map_version), solved)
+    found = evaluate_truth(evaluated, known, joint_covariance_m2=joint_m2)
     if found.landmarks.error_m.count == 0 and found.paths.error_m.count == 0:
         raise InputError(f"{truth_path}: nothing in it is near anything in the map: no error can be measured")
     return Answer(truth_values(found) | {"map_version": solved.head.map_version}, truth_lines(found))

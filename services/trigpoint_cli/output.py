@@ -19,6 +19,7 @@ from trigpoint.errors import InputError
 JsonObject = dict[str, Any]
 
 FRACTION_STEPS = 1000
+LIVE_S, WRITTEN_S = 0.2, 2.0  # between two states of a bar, on a terminal and in a file
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +88,15 @@ class Screen:
             yield heard
 
     def _bar(self, what: str, **options: Any) -> "tqdm[Any]":
-        return tqdm(desc=what, file=sys.stderr, disable=self._silent, leave=True, mininterval=0.2, **options)
+        interval_s = LIVE_S if sys.stderr.isatty() else WRITTEN_S
+        return tqdm(desc=what, file=sys.stderr, disable=self._silent, mininterval=interval_s, **options)
+            desc=what,
+            file=sys.stderr,
+            disable=self._silent,
+            leave=True,
+            mininterval=0.2 if sys.stderr.isatty() else 2.0,
+            **options,
+        )
 
     def note(self, line: str) -> None:
         """A line on standard error."""

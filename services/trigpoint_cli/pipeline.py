@@ -12,6 +12,7 @@ from trigpoint.geodesy.projection import MapFrame
 from trigpoint.logs.ports import EventLog
 from trigpoint.logs.readings import logged_anchors, logged_drives, logged_frame
 from trigpoint_cli.data_dir import DataDirectory
+from trigpoint_cli.kept_solves import KeptSolve, keep, kept_of
 from trigpoint_cli.output import Screen
 from trigpoint_evaluation.app import logged_map
 from trigpoint_filtering.app import filter_log
@@ -34,10 +35,12 @@ class Inputs:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Built:
-    """A new map version: as solved, as the log has it, and what the landmark database made of it."""
+    """A new map version: as the log has it, what was kept of its solve, the drives in it, and what the landmark
+    database made of it."""
 
-    solution: Solution
     solved: SolvedMap
+    kept: KeptSolve
+    drives: tuple[Drive, ...]
     projection: ProjectionReport
 
 
@@ -49,10 +52,8 @@ def read_inputs(log: EventLog, screen: Screen) -> Inputs:
     return Inputs(frame=frame, drives=drives, anchors=logged_anchors(log))
 
 
-def inputs_of(solution: Solution, log: EventLog) -> Inputs:
-    """What a solution was just made from: its drives are not read again."""
-    drives = tuple(prepared.drive for prepared in solution.solved.fleet.prepared)
-    return Inputs(frame=logged_frame(log), drives=drives, anchors=logged_anchors(log))
+def _drives_of(solution: Solution) -> tuple[Drive, ...]:
+    return tuple(prepared.drive for prepared in solution.solved.fleet.prepared)
 
 
 def settings_for(
@@ -100,8 +101,10 @@ def build_map(
         filter_log(log, FilterSettings(), progress=filtering)
     with screen.stages("solving") as solving:
         solution = build(log, settings, progress=solving)
-    projection = project_map(data, log, screen)
-    return Built(solution=solution, solved=logged_map(log), projection=projection)
+    projection, solved = project_map(data, log, screen), logged_map(log)
+    kept = kept_of(solution)
+    keep(data, solved.head.map_version, kept)
+    return Built(solved=solved, kept=kept, drives=_drives_of(solution), projection=projection)
 
 
 def project_map(data: DataDirectory, log: EventLog, screen: Screen) -> ProjectionReport:

@@ -6,15 +6,15 @@ from pathlib import Path
 from platform import python_version
 
 import click
-import numpy as np
-from numpy.typing import NDArray
 
 from trigpoint.errors import InputError
-from trigpoint.events.solved import LabelReduction, SolvedMap
+from trigpoint.events.solved import LabelReduction
 from trigpoint.logs.ports import EventLog
+from trigpoint.logs.readings import logged_anchors, logged_frame
 from trigpoint_cli.data_dir import DataDirectory, data_option
+from trigpoint_cli.kept_solves import joint_covariance_m2, kept_of, kept_solve
 from trigpoint_cli.output import Answer, Screen, answering
-from trigpoint_cli.pipeline import inputs_of, read_inputs, settings_for, solve
+from trigpoint_cli.pipeline import Built, Inputs, read_inputs, settings_for, solve
 from trigpoint_evaluation.app import (
     Evaluated,
     TruthEvaluation,
@@ -34,7 +34,6 @@ from trigpoint_evaluation.core.draws import (
 )
 from trigpoint_evaluation.report.content import LeaveOutCurves, ReportContent, UntiedResiduals
 from trigpoint_evaluation.report.page import report_page
-from trigpoint_optimisation.core.solve import Solution
 
 CURVE_DRAWS = 100  # for every number of tied labels: enough for a smooth band
 SOFTWARE = ("trigpoint", "gtsam", "filterpy", "numpy", "scipy", "pyproj", "mcap", "eclipse-zenoh", "matplotlib")
@@ -59,19 +58,25 @@ def command(data: DataDirectory, truth_path: Path | None, *, screen: Screen) -> 
 
 
 def write_report(
-    data: DataDirectory, log: EventLog, screen: Screen, *, truth_path: Path | None, solution: Solution | None = None
+    data: DataDirectory, log: EventLog, screen: Screen, *, truth_path: Path | None, built: Built | None = None
 ) -> TruthEvaluation | None:
     """The report in its place, and the evaluation against truth where there is truth.
 
-    `solution` is the newest map version's where it was just solved; else it is solved again for its held-out anchors.
+    `built` is the newest map version where it was just built. What was not kept of it is solved again.
     """
     solved, estimates = logged_map(log), logged_estimates(log)
-    inputs = read_inputs(log, screen) if solution is None else inputs_of(solution, log)
-    if solution is None and inputs.anchors:
+    if built is None:
+        inputs = read_inputs(log, screen)
+    else:
+        inputs = Inputs(frame=logged_frame(log), drives=built.drives, anchors=logged_anchors(log))
+    kept = kept_solve(data, solved.head.map_version) if built is None else built.kept
+    if kept is None and inputs.anchors:
         settings = settings_for("anchored", inputs.anchors)
-        solution = solve(inputs, settings, screen, verdicts=estimates.verdicts, what="solving for held-out anchors")
+        kept = kept_of(
+            solve(inputs, settings, screen, verdicts=estimates.verdicts, what="solving for held-out anchors")
+        )
     evaluated = Evaluated(solved=solved, frame=inputs.frame, drives=inputs.drives, verdicts=estimates.verdicts)
-    joint_m2 = None if solution is None else _joint_covariance_m2(solution, solved)
+    joint_m2 = joint_covariance_m2(kept, solved)
     truth = None
     if truth_path is not None:
         truth = evaluate_truth(evaluated, read_truth(truth_path), joint_covariance_m2=joint_m2)
@@ -83,17 +88,11 @@ def write_report(
         versions=(*((name, _version(name)) for name in SOFTWARE), ("Python", python_version())),
         truth=truth,
     )
-    if solution is not None and inputs.anchors:
-        content = _with_reduction(content, solution.reduction(), screen)
+    if kept is not None:
+        content = _with_reduction(content, kept.reduction, screen)
     with screen.part_of("writing the report") as progress:
         _write(data.report, report_page(content, progress=progress))
     return truth
-
-
-def _joint_covariance_m2(solution: Solution, solved: SolvedMap) -> NDArray[np.float64] | None:
-    """All landmarks' covariance together, if the solution is of the same landmarks as the map version."""
-    names = [one.landmark for one in solution.map.landmarks]
-    return solution.landmark_covariance if names == [one.landmark for one in solved.landmarks] else None
 
 
 def _version(name: str) -> str:
