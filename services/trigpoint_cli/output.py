@@ -90,13 +90,6 @@ class Screen:
     def _bar(self, what: str, **options: Any) -> "tqdm[Any]":
         interval_s = LIVE_S if sys.stderr.isatty() else WRITTEN_S
         return tqdm(desc=what, file=sys.stderr, disable=self._silent, mininterval=interval_s, **options)
-            desc=what,
-            file=sys.stderr,
-            disable=self._silent,
-            leave=True,
-            mininterval=0.2 if sys.stderr.isatty() else 2.0,
-            **options,
-        )
 
     def note(self, line: str) -> None:
         """A line on standard error."""
