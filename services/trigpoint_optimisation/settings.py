@@ -41,6 +41,16 @@ class CalibrationPriors:
     turn_bias_knot_s: float = 60.0
     delay_s: float = 0.05
     antenna_m: float = 0.30
+    speed_scale_command: float = 0.05  # commanded speeds are not measured ones
+    turn_scale_command: float = 0.10
+    turn_bias_command_radpm: float = 0.002
+    delay_camera_s: float = 0.30  # images are worked on before they are stamped
+    camera_range: float = 0.02  # ln range, averaged over the drive's own bearings
+    camera_range_per_rad: float = 0.05
+    camera_range_per_rad2: float = 0.5  # a camera sees depth: ln cos(bearing) is -bearing^2 / 2
+    camera_ahead_m: float = 0.05
+    camera_bearing_rad: float = 0.03
+    camera_bearing_scale: float = 0.03
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +69,12 @@ class OdometrySettings:
     floor_imu_rad: float = 0.00005
     keyframe_m: float = 2.0
     keyframe_rad: float = 0.2
+    keyframe_moving_s: float = 1.0  # slow vehicles: a keyframe after so long in motion
+    command_m_per_sqrt_s: float = 0.015
+    command_across_m_per_sqrt_s: float = 0.002
+    command_rad_per_sqrt_s: float = 0.015
+    command_fraction: float = 0.1  # of distance and of turn, per keyframe
+    command_across_fraction: float = 0.02
     max_gap_s: float = 2.0
 
 
@@ -80,6 +96,10 @@ class DetectionSettings:
     merge_gate_m: float = 1.0
     split_gate_m: float = 1.5
     cauchy_scale: float = 3.0
+    camera_range: float = 0.005  # ln range
+    camera_inverse_range_per_m: float = 0.0014  # of 1 / range: a constant error in the image
+    camera_bearing_rad: float = 0.007
+    single_cauchy_scale: float = 2.0  # of sightings that enter the graph one by one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -35,7 +35,8 @@ class RigidAlignment:
     residual_m: Floats
 
 
-def _weighted_rigid(point_path_m: Floats, point_map_m: Floats, weight: Floats) -> Pose2:
+def weighted_rigid(point_path_m: Floats, point_map_m: Floats, weight: Floats) -> Pose2:
+    """The rigid motion of points (n, 2) onto points (n, 2), least squares with weights (n,)."""
     total = weight.sum()
     centre_path = weight @ point_path_m / total
     centre_map = weight @ point_map_m / total
@@ -59,12 +60,14 @@ def rigid_alignment(point_path_m: Floats, point_map_m: Floats, *, sigma_m: float
     extent_m = math.sqrt(max(scatter[1], 0.0))
     if extent_m < MIN_EXTENT_SIGMAS * sigma_m:
         raise AlignmentRefused(
-            f"nearly stationary: the path's RMS extent is {extent_m:.2f} m, at least {MIN_EXTENT_SIGMAS * sigma_m:.2f} m is needed"
+            f"nearly stationary: the path's RMS extent is {extent_m:.2f} m, "
+            f"at least {MIN_EXTENT_SIGMAS * sigma_m:.2f} m is needed"
         )
     ratio = float(max(scatter[0], 0.0) / scatter[1])
     if ratio < MIN_EIGENVALUE_RATIO:
         raise AlignmentRefused(
-            f"nearly straight: the path's eigenvalue ratio is {ratio:.2e}, at least {MIN_EIGENVALUE_RATIO:.0e} is needed"
+            f"nearly straight: the path's eigenvalue ratio is {ratio:.2e}, "
+            f"at least {MIN_EIGENVALUE_RATIO:.0e} is needed"
         )
     return _robust_rigid(point_path_m, point_map_m, sigma_m=sigma_m, ratio=ratio)
 
@@ -73,7 +76,7 @@ def _robust_rigid(point_path_m: Floats, point_map_m: Floats, *, sigma_m: float, 
     weight = np.ones(len(point_path_m))
     residual = np.zeros_like(point_path_m)
     for _ in range(ROBUST_ROUNDS):
-        T_map_path = _weighted_rigid(point_path_m, point_map_m, weight)
+        T_map_path = weighted_rigid(point_path_m, point_map_m, weight)
         as_array = np.array([T_map_path.x_m, T_map_path.y_m, T_map_path.heading_rad])
         residual = point_map_m - transform_points(as_array, point_path_m)
         scale = max(sigma_m, 1.4826 * float(np.median(np.linalg.norm(residual, axis=1))))
@@ -129,7 +132,8 @@ def _smoothed_angles(phasor: NDArray[np.complex128], at_m: Floats, path_m: Float
     if not known.any():
         known = np.zeros(len(path_m), dtype=bool)
         known[0], mean = True, np.full(len(path_m), total[-1])
-    return np.interp(path_m, path_m[known], np.unwrap(np.angle(mean[known])))
+    angle: Floats = np.interp(path_m, path_m[known], np.unwrap(np.angle(mean[known])))
+    return angle
 
 
 def turned_path(pose: Floats, correction_rad: Floats) -> Floats:

@@ -61,6 +61,11 @@ def labels_of(anchors: Sequence[AnchorLabelled], frame: MapFrame, *, image_offse
     )
 
 
+def signed_points(labels: Labels) -> dict[str, Floats]:
+    """Where labels (2,) of known identity are, by signature."""
+    return {name: point_m for name, point_m in zip(labels.signature, labels.label_m, strict=True) if name}
+
+
 def by_signature(labels: Labels, signature: Sequence[str]) -> Assignment:
     """Labels tied to the landmark (numbered by `signature`) of the same known identity."""
     number = {name: index for index, name in enumerate(signature) if name}

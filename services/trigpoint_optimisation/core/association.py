@@ -9,7 +9,9 @@ from trigpoint.geodesy.poses import transform_points
 from trigpoint_optimisation.core.detection_noise import DetectionNoise, measured_noise
 from trigpoint_optimisation.core.fleet import Fleet, detections_in_map
 from trigpoint_optimisation.core.merging import LandmarkGroups, Tracks, voted_pairs
+from trigpoint_optimisation.core.preparation import PreparedDrive
 from trigpoint_optimisation.core.sightings import Sightings, drive_sightings, joined, keyframe_points
+from trigpoint_optimisation.core.single_sightings import VEHICLE, Seeing, SingleSightings, single_sightings
 from trigpoint_optimisation.core.state import MapState
 from trigpoint_optimisation.core.tracklets import close_pairs, linked_tracks, seen_together
 from trigpoint_optimisation.settings import DetectionSettings
@@ -39,6 +41,15 @@ class Association:
         return int(self.landmark_of_track.max()) + 1 if len(self.landmark_of_track) else 0
 
 
+def is_signed(fleet: Fleet) -> bool:
+    """Whether landmarks' detections carry known identities; those without one are then left aside."""
+    return any(
+        name and kind != VEHICLE
+        for each in fleet.prepared
+        for name, kind in zip(each.drive.detections.signature, each.drive.detections.kind, strict=True)
+    )
+
+
 def _named_tracks(fleet: Fleet) -> tuple[tuple[Ints, ...], Ints]:
     """Tracks by known signature, one a drive and signature, and the landmark (t,) each is of."""
     names: dict[str, int] = {}
@@ -49,7 +60,7 @@ def _named_tracks(fleet: Fleet) -> tuple[tuple[Ints, ...], Ints]:
         column = np.full(len(each.drive.detections.signature), -1, dtype=np.int64)
         for row in np.nonzero(each.detection_usable)[0]:
             name = each.drive.detections.signature[row]
-            if not name or each.drive.detections.kind[row] == "vehicle":
+            if not name or each.drive.detections.kind[row] == VEHICLE:
                 continue
             if name not in own:
                 own[name] = len(landmark)
@@ -64,9 +75,7 @@ def _linked_fleet(fleet: Fleet, state: MapState) -> tuple[tuple[Ints, ...], froz
     total, apart, track = 0, set(), []
     for each, point in zip(fleet.prepared, detections_in_map(fleet, state), strict=True):
         stamp_ns = each.drive.detections.stamp_ns
-        usable = each.detection_usable & np.array(
-            [kind != "vehicle" for kind in each.drive.detections.kind], dtype=bool
-        )
+        usable = each.detection_usable & np.array([kind != VEHICLE for kind in each.drive.detections.kind], dtype=bool)
         own = linked_tracks(stamp_ns, point, usable, settings=fleet.settings.detections)
         apart |= {(a + total, b + total) for a, b in seen_together(own, stamp_ns)}
         track.append(np.where(own >= 0, own + total, -1))
@@ -110,13 +119,14 @@ def _path_of_detections(fleet: Fleet, index: int) -> Floats:
     each = fleet.prepared[index]
     path, start_ns = each.motions.path, each.motions.path.stamp_ns[0]
     at_s = (each.drive.detections.stamp_ns - start_ns) * 1e-9
-    return np.interp(at_s, (path.stamp_ns - start_ns) * 1e-9, path.distance_m)
+    along_m: Floats = np.interp(at_s, (path.stamp_ns - start_ns) * 1e-9, path.distance_m)
+    return along_m
 
 
 def first_association(fleet: Fleet, state: MapState) -> Association:
-    """Landmarks by known signatures where the settings say so, else by tracks, broken tracks mended, and joint
+    """Landmarks by known signatures where detections carry any, else by tracks, broken tracks mended, and joint
     shifts between passes and vehicles."""
-    if fleet.settings.known_association:
+    if is_signed(fleet):
         track, landmark = _named_tracks(fleet)
         kind, kinds = _kinds_of_tracks(fleet, track, len(landmark))
         return Association(track=track, landmark_of_track=landmark, kind_of_track=kind, kinds=kinds, apart=frozenset())
@@ -144,7 +154,7 @@ def landmark_means(tracks: Tracks, landmark_of_track: Ints) -> Floats:
 def renewed_association(fleet: Fleet, state: MapState, association: Association) -> Association:
     """The association after a solve: tracks that lie off their landmark leave it, landmarks that lie on one another
     become one."""
-    if fleet.settings.known_association:
+    if is_signed(fleet):
         return association
     tracks, settings = tracks_in_map(fleet, state, association), fleet.settings.detections
     off_m = np.hypot(*(tracks.point_m - state.landmark_m[association.landmark_of_track]).T)
@@ -173,13 +183,24 @@ def _join_close(groups: LandmarkGroups, tracks: Tracks, settings: DetectionSetti
 
 
 def fleet_sightings(fleet: Fleet, association: Association) -> Sightings:
-    """The sightings of all drives under the association."""
+    """The averaged sightings of all drives but cameras' under the association."""
     return joined(
         [
-            drive_sightings(each, track, point_scale=fleet.frame.point_scale, noise=noise)
+            drive_sightings(each, _unless_camera(each, track), point_scale=fleet.frame.point_scale, noise=noise)
             for each, track, noise in zip(fleet.prepared, association.track, fleet.noise, strict=True)
         ]
     )
+
+
+def _unless_camera(prepared: PreparedDrive, track: Ints) -> Ints:
+    """A camera's sightings are not averaged: its error is not in metres."""
+    return np.full_like(track, -1) if prepared.camera else track
+
+
+def fleet_single_sightings(fleet: Fleet, association: Association) -> SingleSightings:
+    """The sightings of all drives that enter the graph one by one."""
+    seeing = Seeing(point_scale=fleet.frame.point_scale, settings=fleet.settings.detections)
+    return single_sightings(fleet.prepared, association.track, association.landmark_of_track, seeing)
 
 
 def with_measured_noise(fleet: Fleet, state: MapState, association: Association) -> Fleet:
@@ -192,7 +213,7 @@ def with_measured_noise(fleet: Fleet, state: MapState, association: Association)
 
 
 def _measured_drive_noise(fleet: Fleet, index: int, state: MapState, landmark: Ints, track: Ints) -> DetectionNoise:
-    each, rows = fleet.prepared[index], np.nonzero(track >= 0)[0]
+    each, rows = fleet.prepared[index], np.nonzero(_unless_camera(fleet.prepared[index], track) >= 0)[0]
     keyframe, offset = each.detection_keyframe[rows], each.detection_offset[rows]
     pose = state.drives[index].pose[keyframe]
     from_keyframe = state.landmark_m[landmark[track[rows]]] - pose[:, :2]

@@ -1,4 +1,5 @@
-"""The factors gtsam does not have: odometry with calibration, a fix at a lever arm, an anchor in an image.
+"""The factors gtsam does not have: odometry with calibration, a fix at a lever arm, a sighting through a sensor with
+calibration, an anchor in an image.
 
 Each function returns one `gtsam.CustomFactor` whose Jacobians are analytic; gtsam's Pose2 increments are in the
 body frame: x, y in m, heading in rad.
@@ -6,6 +7,7 @@ body frame: x, y in m, heading in rad.
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import gtsam
 import numpy as np
@@ -15,6 +17,8 @@ from trigpoint.geodesy.poses import wrap_angle_rad
 
 Floats = NDArray[np.float64]
 Jacobians = list[Floats] | None
+MIN_DISTANCE_M = 0.2  # nearer than this a sighting's logarithm and bearing have no usable derivative
+
 ErrorFunction = Callable[[gtsam.CustomFactor, gtsam.Values, Jacobians], Floats]
 
 
@@ -40,7 +44,7 @@ def odometry_factor(
         ahead, left = c * east + s * north, c * north - s * east
         turned = end.theta() - start.theta()
         unit = np.array([1.0 / scale[0], 1.0 / scale[0], 1.0 / scale[1]])
-        residual = unit * (ahead - expected[0], left - expected[1], wrap_angle_rad(turned - expected[2]))
+        residual: Floats = unit * (ahead - expected[0], left - expected[1], wrap_angle_rad(turned - expected[2]))
         if jacobians is not None:
             ct, st = math.cos(turned), math.sin(turned)
             row = unit[:, None]
@@ -117,3 +121,71 @@ def anchor_factor(keys: tuple[int, ...], label_m: Floats, *, noise: gtsam.noiseM
         return predicted - label_m
 
     return gtsam.CustomFactor(noise, list(keys), error)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measured:
+    """One sighting: ln_range of what the sensor said in map metres, its bearing, and the bearing squared less the
+    drive's mean of it. T_keyframe_sensor (3,); target_m (2,): what was seen, in the frame of the keyframe it hangs
+    on, where it is no landmark."""
+
+    ln_range: float
+    bearing_rad: float
+    centred_square_rad2: float
+    T_keyframe_sensor: Floats
+    target_m: Floats | None
+
+
+def sighting_factor(
+    keys: tuple[int, int, int], measured: Measured, *, noise: gtsam.noiseModel.Base
+) -> gtsam.CustomFactor:
+    """What the sensor on keyframe keys[0] saw of the landmark, or of the other vehicle's keyframe, keys[2].
+
+    keys[1] (6,) is the sensor's calibration: ln range = ln distance + k0 + k1 b + k2 (b^2 - mean b^2), the sensor k3
+    ahead of where it is said to be, bearing b = true bearing + k4 + k5 b. A camera tells depth by the size of
+    things, so its error is in proportion to the range and grows off the axis. Residual: ln range, bearing in rad.
+    In plain numbers, not arrays: there are tens of thousands of these.
+    """
+    x_m, y_m, turned = measured.T_keyframe_sensor.tolist()
+    cs, ss = math.cos(turned), math.sin(turned)
+    bearing, square = measured.bearing_rad, measured.centred_square_rad2
+    target = None if measured.target_m is None else measured.target_m.tolist()
+
+    def error(_: gtsam.CustomFactor, values: gtsam.Values, jacobians: Jacobians) -> Floats:
+        pose = values.atPose2(keys[0])
+        k0, k1, k2, k3, k4, k5 = values.atVector(keys[1]).tolist()
+        seen_x, seen_y, seen_c, seen_s = _seen(values, keys[2], target)
+        heading = pose.theta()
+        c, s = math.cos(heading), math.sin(heading)
+        east, north = seen_x - pose.x(), seen_y - pose.y()
+        ahead, left = c * east + s * north, c * north - s * east
+        x = cs * (ahead - x_m) + ss * (left - y_m) - k3
+        y = cs * (left - y_m) - ss * (ahead - x_m)
+        square_m2 = max(x * x + y * y, MIN_DISTANCE_M**2)
+        if jacobians is not None:
+            gx, gy = x / square_m2, y / square_m2
+            for_range, for_bearing = (gx * cs - gy * ss, gx * ss + gy * cs), (-gy * cs - gx * ss, gx * cs - gy * ss)
+            rows = for_range, for_bearing
+            jacobians[0] = np.array([(-p, -q, p * left - q * ahead) for p, q in rows])
+            jacobians[1] = np.array([(1.0, bearing, square, -gx, 0.0, 0.0), (0.0, 0.0, 0.0, gy, 1.0, bearing)])
+            in_map = [(p * c - q * s, p * s + q * c) for p, q in rows]
+            if target is not None:
+                own = [(p * seen_c + q * seen_s, q * seen_c - p * seen_s) for p, q in in_map]
+                jacobians[2] = np.array([(p, q, q * target[0] - p * target[1]) for p, q in own])
+            else:
+                jacobians[2] = np.array(in_map)
+        expected = 0.5 * math.log(square_m2) + k0 + k1 * bearing + k2 * square
+        off = wrap_angle_rad(math.atan2(y, x) + k4 + (k5 - 1.0) * bearing)
+        return np.array((expected - measured.ln_range, off))
+
+    return gtsam.CustomFactor(noise, list(keys), error)
+
+
+def _seen(values: gtsam.Values, key: int, target: list[float] | None) -> tuple[float, float, float, float]:
+    """x and y in the map of a landmark, or of a point in a keyframe's frame, with that frame's cosine and sine."""
+    if target is None:
+        x, y = values.atPoint2(key).tolist()
+        return x, y, 1.0, 0.0
+    pose = values.atPose2(key)
+    c, s = math.cos(pose.theta()), math.sin(pose.theta())
+    return pose.x() + c * target[0] - s * target[1], pose.y() + s * target[0] + c * target[1], c, s

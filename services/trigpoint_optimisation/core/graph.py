@@ -8,10 +8,18 @@ import gtsam
 import numpy as np
 from numpy.typing import NDArray
 
-from trigpoint_optimisation.core.factors import anchor_factor, decay_factor, fix_factor, odometry_factor
+from trigpoint_optimisation.core.factors import (
+    Measured,
+    anchor_factor,
+    decay_factor,
+    fix_factor,
+    odometry_factor,
+    sighting_factor,
+)
 from trigpoint_optimisation.core.odometry import OdometryCalibration, TurnSource
 from trigpoint_optimisation.core.preparation import PreparedDrive
 from trigpoint_optimisation.core.sightings import Sightings
+from trigpoint_optimisation.core.single_sightings import SingleSightings
 from trigpoint_optimisation.core.state import (
     antenna_key,
     fix_bias_key,
@@ -28,6 +36,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+KNOWN_SIGMA = 1e-3  # of calibration states that are held, in their own units
 MIN_RANGE_M = 0.2  # a sighting closer than this to the base's origin has no usable bearing
 
 
@@ -70,6 +79,34 @@ def add_motions(graph: gtsam.NonlinearFactorGraph, prepared: PreparedDrive) -> N
         )
 
 
+def scale_sigmas(prepared: PreparedDrive, priors: CalibrationPriors) -> Floats:
+    """1-sigma (3,) of speed scale, turn scale and delay in s by what the drive's odometry and sensor are."""
+    commanded = prepared.source is TurnSource.COMMAND
+    return np.array(
+        [
+            priors.speed_scale_command if commanded else priors.speed_scale,
+            turn_sigmas(prepared.source, priors)[0],
+            priors.delay_camera_s if prepared.camera else priors.delay_s,
+        ]
+    )
+
+
+def sensor_sigmas(prepared: PreparedDrive, priors: CalibrationPriors) -> Floats:
+    """1-sigma (6,) of the landmark sensor's calibration, see `sighting_factor`; a lidar's is known."""
+    if not prepared.camera:
+        return np.full(6, KNOWN_SIGMA)
+    return np.array(
+        [
+            priors.camera_range,
+            priors.camera_range_per_rad,
+            priors.camera_range_per_rad2,
+            priors.camera_ahead_m,
+            priors.camera_bearing_rad,
+            priors.camera_bearing_scale,
+        ]
+    )
+
+
 def turn_sigmas(source: TurnSource, priors: CalibrationPriors) -> tuple[float, float]:
     """1-sigma of turn scale and of turn bias (rad, rad/s or rad/m) by where the yaw rate comes from."""
     match source:
@@ -77,6 +114,8 @@ def turn_sigmas(source: TurnSource, priors: CalibrationPriors) -> tuple[float, f
             return priors.turn_scale_imu, priors.turn_bias_imu_radps
         case TurnSource.STEERING:
             return priors.turn_scale_steering, priors.turn_bias_steering_rad
+        case TurnSource.COMMAND:
+            return priors.turn_scale_command, priors.turn_bias_command_radpm
         case _:
             return priors.turn_scale_wheels, priors.turn_bias_wheels_radpm
 
@@ -86,13 +125,13 @@ def add_calibration_priors(
 ) -> None:
     """Every calibration state held at its nominal value with its prior sigma; turn bias as a random walk."""
     d, described = prepared.index, prepared.drive.described
-    turn_scale, turn_bias = turn_sigmas(prepared.source, priors)
-    sigmas = np.array([priors.speed_scale, turn_scale, priors.delay_s])
+    turn_bias = turn_sigmas(prepared.source, priors)[1]
+    sigmas = scale_sigmas(prepared, priors)
     diagonal = gtsam.noiseModel.Diagonal.Sigmas
     graph.add(gtsam.PriorFactorVector(scale_key(d), np.array([point_scale, 1.0, 0.0]), diagonal(sigmas)))
     arm = point_scale * np.array([described.antenna_x_m, described.antenna_y_m])
     graph.add(gtsam.PriorFactorVector(antenna_key(d), arm, diagonal(np.full(2, priors.antenna_m))))
-    graph.add(gtsam.PriorFactorVector(sensor_key(d), np.zeros(6), diagonal(np.full(6, 1e-3))))
+    graph.add(gtsam.PriorFactorVector(sensor_key(d), np.zeros(6), diagonal(sensor_sigmas(prepared, priors))))
     graph.add(gtsam.PriorFactorVector(turn_bias_key(d, 0), np.zeros(1), diagonal(np.array([turn_bias]))))
     walk = turn_bias * priors.turn_bias_walk_fraction * math.sqrt(priors.turn_bias_knot_s / 60.0)
     for knot in range(1, len(prepared.calibration.turn_bias)):
@@ -161,6 +200,28 @@ def add_sightings(
         noise = with_cauchy(gtsam.noiseModel.Gaussian.Covariance(covariance[row]), cauchy_scale)
         keys = pose_key(int(sightings.drive[row]), int(sightings.keyframe[row])), landmark_key(int(landmark[row]))
         graph.add(gtsam.BearingRangeFactor2D(*keys, gtsam.Rot2(bearing[row]), range_m[row], noise))
+
+
+def add_single_sightings(
+    graph: gtsam.NonlinearFactorGraph, sightings: SingleSightings, *, cauchy_scale: float | None
+) -> None:
+    """Every sighting of a landmark by a camera, and of another vehicle's keyframe, through the sensor's calibration."""
+    for row, (d, landmark) in enumerate(zip(sightings.drive, sightings.landmark, strict=True)):
+        of_landmark = landmark >= 0
+        measured = Measured(
+            ln_range=float(sightings.ln_range[row]),
+            bearing_rad=float(sightings.bearing_rad[row]),
+            centred_square_rad2=float(sightings.centred_square_rad2[row]),
+            T_keyframe_sensor=sightings.T_keyframe_sensor[row],
+            target_m=None if of_landmark else sightings.target_m[row],
+        )
+        if of_landmark:
+            seen = landmark_key(int(landmark))
+        else:
+            seen = pose_key(int(sightings.seen_drive[row]), int(sightings.seen_keyframe[row]))
+        keys = pose_key(int(d), int(sightings.keyframe[row])), sensor_key(int(d)), seen
+        noise = with_cauchy(gtsam.noiseModel.Diagonal.Sigmas(sightings.sigma[row]), cauchy_scale)
+        graph.add(sighting_factor(keys, measured, noise=noise))
 
 
 def add_labels(graph: gtsam.NonlinearFactorGraph, labels: TiedLabels, *, cauchy_scale: float | None) -> None:

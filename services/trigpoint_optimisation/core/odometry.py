@@ -15,6 +15,7 @@ Ints = NDArray[np.int64]
 SCALE_STEP = 1e-4  # dimensionless, step of the numeric derivative by speed and turn scale
 DELAY_STEP_S = 0.01  # s, step of the central difference by the clock delay
 BIAS_STEP = 1e-5  # rad, rad/s or rad/m, step of the numeric derivative by turn bias
+MOVING_MPS = 0.02  # slower than this a vehicle stands
 MAX_STEERING_RAD = 1.2  # tan() stays bounded for any steering input
 
 
@@ -24,6 +25,7 @@ class TurnSource(Enum):
     IMU = "imu"
     STEERING = "steering"
     WHEELS = "wheels"
+    COMMAND = "command"
     NONE = "none"
 
 
@@ -80,12 +82,15 @@ class Motions:
 
 
 def turn_source(drive: Drive) -> TurnSource:
-    """The best yaw rate a drive has: IMU, else steering, else the wheels' own."""
+    """The best yaw rate a drive has: IMU, else steering, else the wheels' own, else what was commanded: a yaw rate
+    that comes with the speed though no track is known that it could be measured by."""
     if len(drive.imu.stamp_ns) > 1:
         return TurnSource.IMU
     if np.isfinite(drive.wheels.steering_rad).any():
         return TurnSource.STEERING
-    return TurnSource.WHEELS if np.isfinite(drive.wheels.yaw_rate_radps).any() else TurnSource.NONE
+    if not np.isfinite(drive.wheels.yaw_rate_radps).any():
+        return TurnSource.NONE
+    return TurnSource.WHEELS if drive.described.track_m > 0.0 else TurnSource.COMMAND
 
 
 def _held(values: Floats) -> Floats:
@@ -123,7 +128,7 @@ def _turn_and_speed(drive: Drive, calibration: OdometryCalibration, dt_s: Floats
             return base_speed * curvature * dt_s, base_speed
         case TurnSource.IMU:
             turn = calibration.turn_scale * _imu_turn_rad(drive) + bias * dt_s
-        case TurnSource.WHEELS:
+        case TurnSource.WHEELS | TurnSource.COMMAND:
             turn = (calibration.turn_scale * _mean_of_ends(_held(wheels.yaw_rate_radps)) + bias * speed) * dt_s
         case TurnSource.NONE:
             turn = bias * speed * dt_s
@@ -163,12 +168,17 @@ def _sampling_variance(step: Floats, dt_s: Floats) -> Floats:
     return np.concatenate([[0.0], np.cumsum((change * dt_s) ** 2 / 12.0)])
 
 
-def keyframe_stamps(path: DeadReckonedPath, *, distance_m: float, turn_rad: float) -> Ints:
-    """Stamps (n,) at which the path has gone `distance_m` further or turned `turn_rad` more; ends included."""
-    progress = np.maximum(path.distance_m / distance_m, 0.0) + path.turned_rad / turn_rad
+def keyframe_stamps(path: DeadReckonedPath, *, distance_m: float, turn_rad: float, moving_s: float) -> Ints:
+    """Stamps (n,) at which the path has gone `distance_m` further or turned `turn_rad` more, or, where it is slow,
+    has been in motion for `moving_s`; ends included."""
+    dt_s, step_m = np.diff(path.stamp_ns) * 1e-9, np.diff(path.distance_m)
+    by_path = step_m / distance_m + np.diff(path.turned_rad) / turn_rad
+    by_time = np.where(step_m > MOVING_MPS * dt_s, dt_s / moving_s, 0.0)
+    progress = np.concatenate([[0.0], np.cumsum(np.maximum(by_path, by_time))])
     bins = np.floor(progress).astype(np.int64)
     first = np.concatenate([[0], np.nonzero(np.diff(bins) > 0)[0] + 1, [len(bins) - 1]])
-    return path.stamp_ns[np.unique(first)]
+    stamps: Ints = path.stamp_ns[np.unique(first)]
+    return stamps
 
 
 def relative_poses(pose_from: Floats, pose_to: Floats) -> Floats:
@@ -189,7 +199,8 @@ class OdometryNoise:
     """Random part of odometry that calibration does not explain, growing with the path.
 
     1-sigma over one metre (times the square root of metres): along and across the path in m, heading in rad;
-    `heading_rad_per_sqrt_s` grows with time (gyroscope noise); `turn_fraction` of each heading change is noise.
+    `heading_rad_per_sqrt_s` grows with time (gyroscope noise); `turn_fraction` of each heading change is noise,
+    and so are `along_fraction` and `across_fraction` of each distance; `*_m_per_sqrt_s` grow with time.
     """
 
     along_m: float
@@ -199,6 +210,10 @@ class OdometryNoise:
     turn_fraction: float
     floor_m: float
     floor_rad: float
+    along_m_per_sqrt_s: float = 0.0
+    across_m_per_sqrt_s: float = 0.0
+    along_fraction: float = 0.0
+    across_fraction: float = 0.0
 
 
 def _covariances(path: DeadReckonedPath, stamp_ns: Ints, noise: OdometryNoise) -> Floats:
@@ -210,9 +225,12 @@ def _covariances(path: DeadReckonedPath, stamp_ns: Ints, noise: OdometryNoise) -
     heading += (noise.turn_fraction * turned) ** 2 + noise.floor_rad**2
     heading += np.diff(np.interp(at_s, t_s, path.sampling_rad2))
     along = noise.along_m**2 * metres + noise.floor_m**2 + np.diff(np.interp(at_s, t_s, path.sampling_m2))
+    along += noise.along_m_per_sqrt_s**2 * np.diff(at_s) + (noise.along_fraction * metres) ** 2
+    across = noise.across_m**2 * metres + noise.floor_m**2
+    across += noise.across_m_per_sqrt_s**2 * np.diff(at_s) + (noise.across_fraction * metres) ** 2
     covariance = np.zeros((len(metres), 3, 3))
     covariance[:, 0, 0] = along
-    covariance[:, 1, 1] = noise.across_m**2 * metres + noise.floor_m**2 + heading * metres**2 / 3.0
+    covariance[:, 1, 1] = across + heading * metres**2 / 3.0
     covariance[:, 2, 2] = heading
     covariance[:, 1, 2] = covariance[:, 2, 1] = heading * metres / 2.0
     return covariance

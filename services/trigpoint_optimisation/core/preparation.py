@@ -25,6 +25,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+CAMERA = "camera"  # VehicleDescribed.landmark_sensor_model
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PreparedDrive:
@@ -50,6 +52,16 @@ class PreparedDrive:
     detection_keyframe: Ints
     detection_offset: Floats
 
+    @property
+    def camera(self) -> bool:
+        """Whether the landmark sensor is a camera, which tells ranges by the size of things."""
+        return self.drive.described.landmark_sensor_model == CAMERA
+
+    def hung(self, stamp_ns: Ints) -> tuple[Ints, Floats]:
+        """The keyframe (m,) before each stamp and the base's pose (m, 3) at the stamp in its frame."""
+        keyframe, offset, _ = _hung(self.motions.path, self.stamp_ns, stamp_ns)
+        return keyframe, offset
+
 
 def nominal_calibration(drive: Drive, priors: CalibrationPriors, *, point_scale: float) -> OdometryCalibration:
     """The calibration a drive starts from: nominal, with a turn bias knot every `turn_bias_knot_s`."""
@@ -63,6 +75,8 @@ def nominal_calibration(drive: Drive, priors: CalibrationPriors, *, point_scale:
 def odometry_noise(source: TurnSource, settings: OdometrySettings) -> OdometryNoise:
     """The noise of a drive's odometry by where its yaw rate comes from."""
     by_imu = source is TurnSource.IMU
+    if source is TurnSource.COMMAND:
+        return _command_noise(settings)
     return OdometryNoise(
         along_m=settings.along_m,
         across_m=settings.across_m,
@@ -71,6 +85,22 @@ def odometry_noise(source: TurnSource, settings: OdometrySettings) -> OdometryNo
         turn_fraction=settings.turn_fraction_imu if by_imu else settings.turn_fraction,
         floor_m=settings.floor_m,
         floor_rad=settings.floor_imu_rad if by_imu else settings.floor_rad,
+    )
+
+
+def _command_noise(settings: OdometrySettings) -> OdometryNoise:
+    return OdometryNoise(
+        along_m=0.0,
+        across_m=0.0,
+        heading_rad=0.0,
+        heading_rad_per_sqrt_s=settings.command_rad_per_sqrt_s,
+        turn_fraction=settings.command_fraction,
+        floor_m=0.0,
+        floor_rad=0.0,
+        along_m_per_sqrt_s=settings.command_m_per_sqrt_s,
+        across_m_per_sqrt_s=settings.command_across_m_per_sqrt_s,
+        along_fraction=settings.command_fraction,
+        across_fraction=settings.command_across_fraction,
     )
 
 
@@ -95,7 +125,9 @@ def prepared_drive(
     source, odometry = turn_source(drive), settings.odometry
     if keyframe_ns is None:
         path = dead_reckon(drive, calibration, max_gap_s=odometry.max_gap_s)
-        keyframe_ns = keyframe_stamps(path, distance_m=odometry.keyframe_m, turn_rad=odometry.keyframe_rad)
+        keyframe_ns = keyframe_stamps(
+            path, distance_m=odometry.keyframe_m, turn_rad=odometry.keyframe_rad, moving_s=odometry.keyframe_moving_s
+        )
     motions = keyframe_motions(
         drive, calibration, keyframe_ns, noise=odometry_noise(source, odometry), max_gap_s=odometry.max_gap_s
     )
@@ -122,7 +154,8 @@ def prepared_drive(
 
 def _path_length_at(path: DeadReckonedPath, stamp_ns: Ints) -> Floats:
     start_ns = path.stamp_ns[0]
-    return np.interp((stamp_ns - start_ns) * 1e-9, (path.stamp_ns - start_ns) * 1e-9, path.distance_m)
+    length_m: Floats = np.interp((stamp_ns - start_ns) * 1e-9, (path.stamp_ns - start_ns) * 1e-9, path.distance_m)
+    return length_m
 
 
 def detected_points(prepared: PreparedDrive, *, point_scale: float) -> Floats:

@@ -18,6 +18,7 @@ from trigpoint_optimisation.core.anchoring import (
     labels_of,
     nearest_assignment,
     residuals_m,
+    signed_points,
     tied_labels,
     voted_assignment,
     without_outliers,
@@ -26,6 +27,7 @@ from trigpoint_optimisation.core.association import (
     Association,
     first_association,
     fleet_sightings,
+    fleet_single_sightings,
     landmark_means,
     renewed_association,
     tracks_in_map,
@@ -39,11 +41,12 @@ from trigpoint_optimisation.core.fleet import (
     recalibrated,
     solved_state,
 )
-from trigpoint_optimisation.core.georeferencing import georeferenced
-from trigpoint_optimisation.core.graph import add_labels, add_sightings
+from trigpoint_optimisation.core.fleet_placing import LeftOut, PlacedFleet, drivable, placed_fleet
+from trigpoint_optimisation.core.graph import add_labels, add_sightings, add_single_sightings
 from trigpoint_optimisation.core.marginals import Reduced, covariance_of, reduced
 from trigpoint_optimisation.core.rigid import rigid_graph, rigid_state
 from trigpoint_optimisation.core.sightings import Sightings
+from trigpoint_optimisation.core.single_sightings import SingleSightings
 from trigpoint_optimisation.core.state import MapState, image_key, landmark_key, values_of
 from trigpoint_optimisation.settings import SolveSettings
 
@@ -52,11 +55,13 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 ASSOCIATION_ROUNDS = 3
+SINGLE_CAUCHY_SCALES = (10.0, 3.0, 2.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Solved:
-    """A solved fleet: its state, which detection is of which landmark, which label of which, and the sightings."""
+    """A solved fleet: its state, which detection is of which landmark, which label of which, the sightings, averaged
+    and single, and the drives that could not be placed."""
 
     fleet: Fleet
     state: MapState
@@ -64,6 +69,8 @@ class Solved:
     sightings: Sightings
     labels: Labels
     assignment: Assignment
+    singles: SingleSightings
+    left_out: tuple[LeftOut, ...] = ()
 
 
 def quiet(stage: str, part: float) -> None:
@@ -81,17 +88,19 @@ def solve_fleet(
 ) -> Solved:
     """The fleet solved by the settings' method; `allowed` (f,) per drive says which fixes may be used.
 
-    Raises AlignmentRefused when the data leave a drive's place undetermined.
+    Drives whose place the data leave undetermined are left out; raises AlignmentRefused when all are.
     """
     masks = allowed if allowed is not None else [np.ones(len(drive.fixes.stamp_ns), dtype=bool) for drive in drives]
-    fleet = prepared_fleet(drives, frame, settings, allowed=masks)
-    fleet, state = georeferenced(fleet, progress=progress)
-    solved = _with_landmarks(fleet, state, progress)
+    chosen, left_out = drivable(drives)
+    fleet = prepared_fleet([drives[i] for i in chosen], frame, settings, allowed=[masks[i] for i in chosen])
+    labels = labels_of(anchors if settings.method == "anchored" else (), frame, image_offsets=settings.image_offsets)
+    placed = placed_fleet(fleet, signed_points(labels), left_out=left_out, progress=progress)
+    solved = _with_landmarks(placed, no_labels()[0] if placed.by_fixes else labels, progress)
     if settings.method == "rigid":
         landmark = solved.association.landmark_of_track[solved.sightings.track]
         return replace(solved, state=rigid_state(solved.fleet, solved.state, solved.sightings, landmark))
     if settings.method == "anchored":
-        solved = anchored(solved, labels_of(anchors, frame, image_offsets=settings.image_offsets), progress=progress)
+        solved = anchored(solved, labels, progress=progress)
     return solved
 
 
@@ -111,27 +120,60 @@ def no_labels() -> tuple[Labels, Assignment]:
     return labels, Assignment(landmark=none, reason=())
 
 
-def _with_landmarks(fleet: Fleet, state: MapState, progress: Progress) -> Solved:
-    """Landmarks associated and solved for, in rounds: each solve makes the next association surer."""
-    association = first_association(fleet, state)
-    labels, assignment = no_labels()
+def _with_landmarks(placed: PlacedFleet, labels: Labels, progress: Progress) -> Solved:
+    """Landmarks associated and solved for, in rounds: each solve makes the next association surer.
+
+    Labels of known landmarks are tied from the start: where fixes do not hold the map, nothing else may.
+    """
+    fleet, state = placed.fleet, replace(placed.state, image_m=np.zeros((len(labels.images), 2)))
+    solved = _associated(fleet, state, first_association(fleet, state), labels)
+    solved = replace(solved, left_out=placed.left_out)
+    if len(solved.singles.row):
+        solved = _calibrated(solved, progress)
     for turn in range(ASSOCIATION_ROUNDS):
-        tracks = tracks_in_map(fleet, state, association)
-        state = replace(state, landmark_m=landmark_means(tracks, association.landmark_of_track))
-        sightings = fleet_sightings(fleet, association)
-        solved = Solved(
-            fleet=fleet, state=state, association=association, sightings=sightings, labels=labels, assignment=assignment
-        )
-        state = solved_state(full_graph(solved), state)
-        fleet = with_measured_noise(recalibrated(fleet, state), state, association)
-        solved = replace(solved, fleet=fleet, state=state)
+        state = solved_state(full_graph(solved), solved.state)
+        fleet = with_measured_noise(recalibrated(solved.fleet, state), state, solved.association)
         progress("landmarks", (turn + 1) / ASSOCIATION_ROUNDS)
-        renewed = renewed_association(fleet, state, association)
-        if np.array_equal(renewed.landmark_of_track, association.landmark_of_track):
+        renewed = renewed_association(fleet, state, solved.association)
+        if np.array_equal(renewed.landmark_of_track, solved.association.landmark_of_track):
             break
-        association = renewed
-    solved = replace(solved, sightings=fleet_sightings(fleet, solved.association))
+        solved = replace(_associated(fleet, state, renewed, labels), left_out=placed.left_out)
+    solved = _resighted(replace(solved, fleet=fleet, state=state))
     return replace(solved, state=solved_state(full_graph(solved), solved.state))
+
+
+def _associated(fleet: Fleet, state: MapState, association: Association, labels: Labels) -> Solved:
+    """The fleet with landmarks where the association's tracks have their means."""
+    tracks = tracks_in_map(fleet, state, association)
+    solved = Solved(
+        fleet=fleet,
+        state=replace(state, landmark_m=landmark_means(tracks, association.landmark_of_track)),
+        association=association,
+        sightings=fleet_sightings(fleet, association),
+        singles=fleet_single_sightings(fleet, association),
+        labels=labels,
+        assignment=no_labels()[1],
+    )
+    return replace(solved, assignment=by_signature(labels, landmark_signatures(solved)))
+
+
+def _resighted(solved: Solved) -> Solved:
+    """The solve with its sightings made anew, as a new calibration of odometry moves them."""
+    return replace(
+        solved,
+        sightings=fleet_sightings(solved.fleet, solved.association),
+        singles=fleet_single_sightings(solved.fleet, solved.association),
+    )
+
+
+def _calibrated(solved: Solved, progress: Progress) -> Solved:
+    """The solve from wide kernels on single sightings to narrow ones: a sensor far from its nominal calibration
+    would have its sightings taken for outliers."""
+    for turn, cauchy_scale in enumerate(SINGLE_CAUCHY_SCALES):
+        state = solved_state(full_graph(solved, single_cauchy_scale=cauchy_scale), solved.state)
+        solved = _resighted(replace(solved, fleet=recalibrated(solved.fleet, state), state=state))
+        progress("calibration", (turn + 1) / len(SINGLE_CAUCHY_SCALES))
+    return solved
 
 
 def with_fix_bias(state: MapState) -> bool:
@@ -139,7 +181,9 @@ def with_fix_bias(state: MapState) -> bool:
     return any(len(drive.fix_bias_m) for drive in state.drives)
 
 
-def full_graph(solved: Solved, *, with_labels: bool = True) -> gtsam.NonlinearFactorGraph:
+def full_graph(
+    solved: Solved, *, with_labels: bool = True, single_cauchy_scale: float | None = None
+) -> gtsam.NonlinearFactorGraph:
     """The graph of a solve: odometry, fixes, landmarks, and labels if wanted; kernels on fixes, landmarks, labels."""
     settings = solved.fleet.settings
     landmark = solved.association.landmark_of_track[solved.sightings.track]
@@ -147,6 +191,8 @@ def full_graph(solved: Solved, *, with_labels: bool = True) -> gtsam.NonlinearFa
         return rigid_graph(solved.fleet, solved.state, solved.sightings, landmark)
     graph = georeferenced_graph(solved.fleet, robust=True)
     add_sightings(graph, solved.sightings, landmark, cauchy_scale=settings.detections.cauchy_scale)
+    kernel = single_cauchy_scale or settings.detections.single_cauchy_scale
+    add_single_sightings(graph, solved.singles, cauchy_scale=kernel)
     if with_labels:
         tied, _ = tied_labels(solved.labels, solved.assignment)
         add_labels(graph, tied, cauchy_scale=None)
