@@ -57,7 +57,7 @@ def kept_solve(data: DataDirectory, map_version: int) -> KeptSolve | None:
     if not path.is_file():
         return None
     try:
-        with np.load(path) as arrays:
+        with path.open("rb") as file, np.load(file) as arrays:
             found = {name: arrays[name] for name in arrays.files}
     except (OSError, ValueError, zipfile.BadZipFile):
         return None  # half written: it is solved again

@@ -1,0 +1,184 @@
+"""The whole way of the data by the command, on a campus of a few streets."""
+
+import json
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from command_runs.running import Run, trigpoint
+from command_runs.small_campus import LABELS, write_small_campus
+from trigpoint_vehicle.app import Written
+
+ERROR_KEYS = {"count", "mean", "median", "rmse", "p95", "max"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BuiltCampus:
+    data: Path
+    written: Written
+    ingested: Run
+    imported: Run
+    built: Run
+
+
+@pytest.fixture(scope="module")
+def campus(tmp_path_factory: pytest.TempPathFactory) -> BuiltCampus:
+    folder = tmp_path_factory.mktemp("campus")
+    data, written = folder / "data", write_small_campus(folder / "raw")
+    assert written.anchors is not None
+    return BuiltCampus(
+        data=data,
+        written=written,
+        ingested=trigpoint("ingest", *written.logs, "--data", data, "--json"),
+        imported=trigpoint("anchors", "import", written.anchors, "--data", data, "--json"),
+        built=trigpoint("build", "--data", data, "--json"),
+    )
+
+
+def test_every_event_is_taken_in_and_counted_by_vehicle(campus: BuiltCampus) -> None:
+    answer = campus.ingested.answer
+    assert campus.ingested.status == 0
+    assert answer["accepted"] == sum(one["accepted"] for one in answer["vehicles"].values()) > 10_000
+    assert (answer["duplicates"], answer["refused"], answer["damaged"]) == (0, {}, [])
+
+
+def test_the_same_logs_again_change_nothing(campus: BuiltCampus, tmp_path: Path) -> None:
+    data = shutil.copytree(campus.data, tmp_path / "data")
+    answer = trigpoint("ingest", *campus.written.logs, "--data", data, "--json").answer
+    assert (answer["accepted"], answer["duplicates"]) == (0, campus.ingested.answer["accepted"])
+    again = trigpoint("anchors", "import", str(campus.written.anchors), "--data", data, "--json").answer
+    assert again["anchors"] == {"added": 0, "known": LABELS, "relabelled": 0, "refused": 0}
+
+
+def test_with_anchors_the_map_is_anchored_without_being_asked(campus: BuiltCampus) -> None:
+    answer = campus.built.answer
+    assert campus.built.status == 0
+    assert (answer["map_version"], answer["method"]) == (1, "anchored")
+    assert answer["anchors"]["tied"] >= 0.8 * LABELS
+    assert answer["landmarks"]["count"] > 80  # of 130, some never in view for long
+    assert set(answer["vehicles"]) == {"vehicle-1", "vehicle-2"}
+    assert set(answer["anchor_residual_m"]) == ERROR_KEYS
+
+
+def test_the_map_is_measured_against_truth(campus: BuiltCampus) -> None:
+    answer = trigpoint(
+        "evaluate", "truth", "--data", campus.data, "--truth", str(campus.written.truth), "--json"
+    ).answer
+    assert set(answer["error_m"]) == ERROR_KEYS
+    assert answer["error_m"]["mean"] < 0.6  # metres: two images of 0.35 m an axis leave about 0.3
+    assert answer["error_without_shift_m"]["mean"] < 0.2
+    assert answer["gate"]["car_park_accepted"] == 0
+    assert answer["nees_is_joint"]
+    for vehicle in answer["vehicles"].values():
+        assert vehicle["error_m"]["mean"] < vehicle["raw_fix_error_m"]["mean"]
+
+
+def test_held_out_anchors_are_predicted_better_with_others_tied(campus: BuiltCampus) -> None:
+    def mean_m(tied: int) -> float:
+        words = ("--tied", tied, "--draws", 50, "--seed", 1, "--json")
+        answer = trigpoint("evaluate", "leave-out", "--data", campus.data, *words).answer
+        return float(answer["error_m"]["mean"])
+
+    assert mean_m(10) < mean_m(0)
+
+
+def test_the_whole_curve_has_a_point_for_every_number_of_tied_anchors(campus: BuiltCampus) -> None:
+    answer = trigpoint("evaluate", "leave-out", "--data", campus.data, "--draws", 5, "--json").answer
+    assert [point["tied"] for point in answer["curve"]] == list(range(answer["anchors"]["count"]))
+
+
+def test_tying_more_anchors_than_there_are_is_refused(campus: BuiltCampus) -> None:
+    said = trigpoint("evaluate", "leave-out", "--data", campus.data, "--tied", 99, "--json")
+    assert (said.status, said.answer["exit_status"]) == (2, 2)
+    assert "99 labels tied" in said.answer["error"]
+
+
+def test_the_landmark_database_answers_where_the_map_is(campus: BuiltCampus) -> None:
+    everything = trigpoint("landmarks", "--data", campus.data, "--json").answer["landmarks"]
+    first = everything["items"][0]
+    near = f"{first['lat_deg']},{first['lon_deg']}"
+    found = trigpoint("landmarks", "--data", campus.data, f"--near={near}", "--radius-m", 50, "--json").answer[
+        "landmarks"
+    ]
+    assert found["items"][0]["landmark"] == first["landmark"]
+    assert 1 <= found["count"] < everything["count"] == campus.built.answer["landmarks"]["count"]
+
+
+def test_geojson_is_one_feature_collection(campus: BuiltCampus) -> None:
+    collection = json.loads(trigpoint("landmarks", "--data", campus.data, "--geojson").out)
+    assert collection["type"] == "FeatureCollection"
+    assert len(collection["features"]) == campus.built.answer["landmarks"]["count"]
+
+
+def test_replay_finds_no_difference(campus: BuiltCampus) -> None:
+    said = trigpoint("replay", "--data", campus.data, "--json")
+    assert (said.status, said.answer["differences"]) == (0, 0)
+
+
+def test_the_log_is_whole_and_says_what_it_holds(campus: BuiltCampus) -> None:
+    assert trigpoint("log", "verify", campus.data, "--json").answer["whole"]
+    streams = {file["stream"] for file in trigpoint("log", "info", campus.data, "--json").answer["files"]}
+    assert {"veh-vehicle-1", "veh-vehicle-2", "map", "corrections", "filtering", "optimisation"} <= streams
+
+
+def test_a_flipped_bit_in_the_log_is_found(campus: BuiltCampus, tmp_path: Path) -> None:
+    data = shutil.copytree(campus.data, tmp_path / "data")
+    (path,) = (data / "log" / "veh-vehicle-1").glob("*.mcap")
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    said = trigpoint("log", "verify", data, "--json")
+    assert said.status == 2
+    assert str(path) in said.answer["error"]
+    assert not said.answer["whole"]
+
+
+def test_a_truncated_vehicle_log_ends_with_status_2_and_what_is_whole_is_taken(
+    campus: BuiltCampus, tmp_path: Path
+) -> None:
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(campus.written.logs[0].read_bytes()[:-2000])
+    said = trigpoint("ingest", cut, campus.written.logs[1], "--data", tmp_path / "data", "--json")
+    assert said.status == 2
+    assert said.answer["damaged"]
+    counts = campus.ingested.answer["vehicles"]
+    assert said.answer["vehicles"]["vehicle-2"]["accepted"] == counts["vehicle-2"]["accepted"]
+
+
+def test_the_report_is_written_beside_the_log(campus: BuiltCampus) -> None:
+    said = trigpoint("report", "--data", campus.data, "--truth", str(campus.written.truth), "--json")
+    page = (campus.data / "report.html").read_text(encoding="utf-8")
+    assert said.answer["size_bytes"] == len(page.encode())
+    assert "<h2>Held-out anchors</h2>" in page
+    assert "<h2>Against truth</h2>" in page
+
+
+def test_anchors_from_the_wrong_hemisphere_are_refused_and_the_map_stays(campus: BuiltCampus, tmp_path: Path) -> None:
+    wrong = tmp_path / "wrong.csv"
+    wrong.write_text("anchor,lat,lon,sigma_m\nmirrored,33.89,151.19,0.1\n")
+    data = shutil.copytree(campus.data, tmp_path / "data")
+    said = trigpoint("anchors", "import", wrong, "--data", data, "--json")
+    assert said.status == 2
+    assert "mirrored" in said.answer["error"]
+    assert said.answer["anchors"]["added"] == 0
+
+
+@pytest.mark.slow
+def test_withheld_fixes_are_measured_against_a_solve_without_them(campus: BuiltCampus) -> None:
+    words = ("--withhold-period-s", 60, "--withhold-duration-s", 20, "--withhold-offset-s", 10)
+    answer = trigpoint("evaluate", "gnss", "--data", campus.data, *words, "--json").answer
+    assert set(answer["error_m"]) == set(answer["path_difference_m"]) == ERROR_KEYS
+    assert answer["error_m"]["count"] == sum(one["error_m"]["count"] for one in answer["vehicles"].values())
+    assert answer["path_difference_m"]["median"] < answer["error_m"]["median"]
+    assert 0 < answer["error_m"]["count"] <= answer["withheld"]
+
+
+@pytest.mark.slow
+def test_without_anchors_the_map_is_loose(campus: BuiltCampus, tmp_path: Path) -> None:
+    trigpoint("ingest", *campus.written.logs, "--data", tmp_path)
+    said = trigpoint("build", "--data", tmp_path, "--method", "anchored", "--json")
+    assert said.status == 2
+    assert "no anchor" in said.answer["error"]
+    assert trigpoint("build", "--data", tmp_path, "--json").answer["method"] == "loose"

@@ -1,0 +1,91 @@
+from pathlib import Path
+
+import pytest
+
+from command_runs.running import trigpoint
+
+NOTHING = "no-such-directory"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("build", "--data", NOTHING),
+        ("evaluate", "gnss", "--data", NOTHING, "--withhold-period-s", "60", "--withhold-duration-s", "30"),
+        ("evaluate", "leave-out", "--data", NOTHING, "--tied", "3"),
+        ("landmarks", "--data", NOTHING),
+        ("replay", "--data", NOTHING),
+        ("report", "--data", NOTHING),
+        ("log", "info", NOTHING),
+        ("log", "verify", NOTHING),
+        ("ingest", "missing.mcap", "--data", NOTHING),
+        ("anchors", "import", "missing.geojson", "--data", NOTHING),
+        ("convert", "victoria-park", NOTHING, NOTHING),
+        ("convert", "mrclam", NOTHING, NOTHING),
+        ("convert", "table", "missing.toml", NOTHING),
+    ],
+    ids=" ".join,
+)
+def test_what_is_not_there_is_named_in_one_line_and_ends_with_status_2(
+    words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    said = trigpoint(*words, "--json")
+    assert said.status == said.answer["exit_status"] == 2
+    assert said.err.count("\n") == 1
+    assert said.answer["error"] in said.err
+    assert "missing." in said.err or NOTHING in said.err
+
+
+def test_nothing_is_made_for_a_command_that_only_reads(tmp_path: Path) -> None:
+    trigpoint("build", "--data", tmp_path / NOTHING)
+    trigpoint("landmarks", "--data", tmp_path / NOTHING)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_empty_directory_is_no_data_directory(tmp_path: Path) -> None:
+    said = trigpoint("build", "--data", tmp_path, "--json")
+    assert said.status == 2
+    assert "no log in there" in said.answer["error"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("sail",),
+        ("build",),
+        ("build", "--data", ".", "--method", "magic"),
+        ("evaluate", "gnss", "--data", "."),
+        ("demo", "--seed", "many"),
+    ],
+    ids=" ".join,
+)
+def test_bad_usage_ends_with_status_2_and_says_why(words: tuple[str, ...]) -> None:
+    said = trigpoint(*words, "--json")
+    assert (said.status, said.answer["exit_status"]) == (2, 2)
+    assert words[-1] in said.err or "Missing option" in said.err
+
+
+@pytest.mark.parametrize(("option", "value"), [("--seed", "-1"), ("--vehicles", "0"), ("--vehicles", "51")])
+def test_a_campus_that_cannot_be_is_refused_with_the_limits(option: str, value: str, tmp_path: Path) -> None:
+    said = trigpoint("demo", "--out", tmp_path / "demo", option, value, "--json")
+    assert said.status == 2
+    assert value in said.answer["error"]
+    assert not (tmp_path / "demo").exists()
+
+
+def test_a_demonstration_does_not_empty_somebody_else_s_directory(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("years of work")
+    said = trigpoint("demo", "--out", tmp_path, "--json")
+    assert said.status == 2
+    assert (tmp_path / "thesis.tex").read_text() == "years of work"
+
+
+def test_near_without_a_radius_is_refused(tmp_path: Path) -> None:
+    said = trigpoint("landmarks", "--data", tmp_path, "--near", "0,0", "--json")
+    assert said.status == 2
+    assert "--radius-m" in said.answer["error"]
+
+
+def test_without_debug_no_traceback_is_shown(tmp_path: Path) -> None:
+    assert "Traceback" not in trigpoint("build", "--data", tmp_path).err
