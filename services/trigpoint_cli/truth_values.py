@@ -2,6 +2,7 @@
 
 from trigpoint_cli.output import JsonObject, metres
 from trigpoint_evaluation.app import TruthEvaluation
+from trigpoint_evaluation.core.consistency import GateTruth
 from trigpoint_evaluation.core.path_truth import PathTruthEvaluation
 
 
@@ -18,7 +19,7 @@ def path_values(one: PathTruthEvaluation) -> JsonObject:
 
 def truth_values(found: TruthEvaluation) -> JsonObject:
     """The evaluation; `error_m` is the landmarks', or the paths' where truth knows no landmark of the map."""
-    landmarks, matches, gate = found.landmarks, found.landmarks.matches, found.gate
+    landmarks, matches = found.landmarks, found.landmarks.matches
     measured = landmarks.error_m if landmarks.error_m.count else found.paths.error_m
     joint = landmarks.joint_nees_per_dof
     return {
@@ -39,15 +40,19 @@ def truth_values(found: TruthEvaluation) -> JsonObject:
         },
         "trajectory": path_values(found.paths),
         "vehicles": {one.vehicle: path_values(one) for one in found.vehicles},
-        "gate": {
-            "car_park_fixes": gate.car_park_fixes,
-            "car_park_accepted": gate.car_park_accepted,
-            "good_fixes": gate.good_fixes,
-            "good_rejected": gate.good_rejected,
-            "good_after_reacquisition": gate.good_after,
-            "good_rejected_after_reacquisition": gate.good_rejected_after,
-            "good_rejected_share": gate.good_rejected_share,
-        },
+        "gate": _gate_values(found.gate),
+    }
+
+
+def _gate_values(gate: GateTruth) -> JsonObject:
+    return {
+        "car_park_fixes": gate.car_park_fixes,
+        "car_park_accepted": gate.car_park_accepted,
+        "good_fixes": gate.good_fixes,
+        "good_rejected": gate.good_rejected,
+        "good_after_reacquisition": gate.good_after,
+        "good_rejected_after_reacquisition": gate.good_rejected_after,
+        "good_rejected_share": gate.good_rejected_share,
     }
 
 
