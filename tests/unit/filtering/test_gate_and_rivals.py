@@ -83,6 +83,17 @@ def test_fixes_that_disagree_do_not_end_an_outage() -> None:
     assert not verdict.accepted
 
 
+@pytest.mark.parametrize(("seconds", "passes"), [(20, False), (27, True)])
+def test_a_gate_grown_wide_asks_for_a_run_longer_than_wrong_clusters(seconds: int, passes: bool) -> None:
+    hypothesis = standing_hypothesis(sigma_m=300.0)
+    for second in range(60, 60 + seconds):
+        hypothesis, verdict = judged(hypothesis, fix_at(400.0, stamp_s=second), ESTIMATOR, limit=LIMIT)
+        if verdict.accepted:
+            break
+    assert verdict.nis < LIMIT
+    assert verdict.accepted is passes
+
+
 def test_a_slow_receiver_is_not_in_an_outage_between_two_fixes() -> None:
     hypothesis = standing_hypothesis()
     for second in (0, 20, 40, 60):
