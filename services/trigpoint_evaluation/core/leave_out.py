@@ -90,20 +90,28 @@ def held_out_of(count: int, tied: Ints, among: Ints) -> Ints:
 
 
 def held_out_errors_m(labels: LinearLabels, tied: Ints, *, among: Ints | None = None) -> Floats:
-    """Distances (k, h) in m of the held-out labels from their predictions, for draws `tied` (k, n) of label numbers.
+    """Lengths (k, h) in m of `held_out_residuals_m`."""
+    residual_m = held_out_residuals_m(labels, tied, among=among)
+    away_m: Floats = np.hypot(residual_m[..., 0], residual_m[..., 1])
+    return away_m
+
+
+def held_out_residuals_m(labels: LinearLabels, tied: Ints, *, among: Ints | None = None) -> Floats:
+    """Held-out labels minus their predictions (k, h, 2) in m, for draws `tied` (k, n) of label numbers.
 
     Held out are the labels of `among` (all, if not given) that a draw does not tie; labels outside it are not
     used at all. A draw that leaves the frame undetermined has NaN.
     """
     chosen = np.arange(labels.count) if among is None else among
     held_out = held_out_of(labels.count, tied, chosen)
-    error_m = np.full(held_out.shape, np.nan)
+    residual_m = np.full((*held_out.shape, 2), np.nan)
     determined = np.flatnonzero(_determined(labels, tied))
     batch = max(1, BATCH_CELLS // max(labels.information.size, 1))
     for first in range(0, len(determined), batch):
         some = determined[first : first + batch]
-        error_m[some] = _errors_m(labels, tied[some], held_out[some])
-    return error_m
+        predicted_m = _predicted_m(labels, tied[some], held_out[some])
+        residual_m[some] = labels.reading_m[held_out[some]] - predicted_m
+    return residual_m
 
 
 def _determined(labels: LinearLabels, tied: Ints) -> NDArray[np.bool_]:
@@ -116,12 +124,6 @@ def _determined(labels: LinearLabels, tied: Ints) -> NDArray[np.bool_]:
     lengths = np.linalg.svd(seen, compute_uv=False)
     fixed: NDArray[np.bool_] = lengths[:, -1] > TIED_LENGTH
     return fixed
-
-
-def _errors_m(labels: LinearLabels, tied: Ints, held_out: Ints) -> Floats:
-    residual = labels.reading_m[held_out] - _predicted_m(labels, tied, held_out)
-    away_m: Floats = np.hypot(residual[..., 0], residual[..., 1])
-    return away_m
 
 
 def _predicted_m(labels: LinearLabels, tied: Ints, held_out: Ints) -> Floats:
