@@ -56,6 +56,7 @@ Bools = NDArray[np.bool_]
 
 ASSOCIATION_ROUNDS = 3
 SINGLE_CAUCHY_SCALES = (10.0, 3.0, 2.0)
+SINGLE_ITERATIONS = 5  # at each of them: where it ends is only the next one's start
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,7 +171,8 @@ def _calibrated(solved: Solved, progress: Progress) -> Solved:
     """The solve from wide kernels on single sightings to narrow ones: a sensor far from its nominal calibration
     would have its sightings taken for outliers."""
     for turn, cauchy_scale in enumerate(SINGLE_CAUCHY_SCALES):
-        state = solved_state(full_graph(solved, single_cauchy_scale=cauchy_scale), solved.state)
+        graph = full_graph(solved, single_cauchy_scale=cauchy_scale)
+        state = solved_state(graph, solved.state, max_iterations=SINGLE_ITERATIONS)
         solved = _resighted(replace(solved, fleet=recalibrated(solved.fleet, state), state=state))
         progress("calibration", (turn + 1) / len(SINGLE_CAUCHY_SCALES))
     return solved
