@@ -1,0 +1,1 @@
+"""Small worlds with landmarks whose truth is known, for tests of the whole solve."""
