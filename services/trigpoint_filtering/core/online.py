@@ -75,7 +75,7 @@ def with_odometer(track: Track, odometer: Odometer) -> Track:
 
 
 def is_step_due(following: Following, odometer: Odometer) -> bool:
-    """Whether the pending motion makes a whole step; a microsecond short is whole (10 Hz against 0.1 s)."""
+    """Whether the pending motion makes a whole step; a microsecond short is whole (10 Hz against 0.2 s)."""
     return odometer.pending.s >= following.settings.max_step_s - 1e-6
 
 
@@ -208,4 +208,4 @@ def _sought(track: Track, fix: Fix, sequence: int) -> Track:
         found = grown(track, seeker, fix, calibration)
     except AlignmentRefused as refusal:
         return told(replace(track, refusal=str(refusal)), unjudged(UNINITIALISED), sequence)
-    return told(replace(track, hypothesis=found, seeker=None), unjudged(INITIALISED), sequence)
+    return told(replace(track, hypothesis=found, seeker=None, refusal=""), unjudged(INITIALISED), sequence)
