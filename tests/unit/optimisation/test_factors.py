@@ -9,12 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from solved_worlds.derivatives import assert_derivatives, values_of
 from trigpoint_optimisation.core.factors import anchor_factor, decay_factor, fix_factor, odometry_factor
 
 Floats = NDArray[np.float64]
 
-STEP = 1e-6  # of the central difference: its own error is about 1e-9 here, far below the tolerance
-SLOPE = 1e-5  # tolerance of a derivative, relative and absolute
 METRES = st.floats(-100.0, 100.0)
 HEADINGS = st.floats(-math.pi, math.pi)
 POSES = st.tuples(METRES, METRES, HEADINGS)
@@ -23,40 +22,6 @@ SYDNEY = (333_512.25, 6_248_731.125)  # m, UTM zone 56: exact in float64, 0.5 m 
 
 def unit(size: int) -> gtsam.noiseModel.Base:
     return gtsam.noiseModel.Unit.Create(size)
-
-
-def values_of(*states: Floats | gtsam.Pose2) -> gtsam.Values:
-    values = gtsam.Values()
-    for key, state in enumerate(states):
-        values.insert(key, state)
-    return values
-
-
-def moved(values: gtsam.Values, key: int, column: int, step: float) -> gtsam.Values:
-    change = gtsam.VectorValues()
-    size = 3 if key in poses_in(values) else len(values.atVector(key))
-    change.insert(key, step * np.eye(size)[column])
-    return values.retract(change)
-
-
-def poses_in(values: gtsam.Values) -> set[int]:
-    return set(gtsam.utilities.allPose2s(values).keys())
-
-
-def numeric_jacobian(factor: gtsam.NoiseModelFactor, values: gtsam.Values, key: int, size: int) -> Floats:
-    columns = [
-        factor.unwhitenedError(moved(values, key, column, STEP))
-        - factor.unwhitenedError(moved(values, key, column, -STEP))
-        for column in range(size)
-    ]
-    return np.column_stack(columns) / (2.0 * STEP)
-
-
-def assert_derivatives(factor: gtsam.NoiseModelFactor, values: gtsam.Values, sizes: tuple[int, ...]) -> None:
-    """The factor, under unit noise, linearises to its numeric derivatives by states 0, 1, ... of the given sizes."""
-    analytic, _ = factor.linearize(values).jacobian()
-    numeric = np.hstack([numeric_jacobian(factor, values, key, size) for key, size in enumerate(sizes)])
-    np.testing.assert_allclose(analytic, numeric, rtol=SLOPE, atol=SLOPE)
 
 
 def an_odometry_factor(covariance: Floats) -> gtsam.CustomFactor:
