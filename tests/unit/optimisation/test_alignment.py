@@ -40,6 +40,7 @@ def placed(T_map_path: Floats, pose: Floats) -> Floats:
     return np.column_stack([transform_points(T_map_path, pose[:, :2]), pose[:, 2] + T_map_path[2]])
 
 
+@settings(deadline=None)
 @given(HEADINGS, st.floats(-1e3, 1e3), st.floats(-1e3, 1e3))
 def test_a_rigid_alignment_recovers_any_motion(heading_rad: float, x_m: float, y_m: float) -> None:
     point, T_map_path = bow()[:, :2], np.array([x_m, y_m, heading_rad])
@@ -108,7 +109,7 @@ def test_two_fixes_are_too_few_and_the_message_counts_them() -> None:
         rigid_alignment(bow()[:2, :2], bow()[:2, :2], sigma_m=2.0)
 
 
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 @given(HEADINGS)
 def test_a_bent_alignment_needs_no_first_guess_of_the_heading(heading_rad: float) -> None:
     pose, T_map_path = bow(), np.array([400.0, -90.0, heading_rad])
@@ -136,6 +137,7 @@ def test_a_drifting_heading_is_followed() -> None:
     assert np.hypot(*(bent.pose - pose)[:, :2].T).max() < 1.0  # m: half a window of unseen drift at the ends
 
 
+@settings(deadline=None)
 @given(st.floats(-3.0, 3.0))
 def test_turning_a_path_by_one_angle_turns_it_as_a_whole(angle_rad: float) -> None:
     pose = bow(30)

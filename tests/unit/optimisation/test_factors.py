@@ -42,7 +42,7 @@ def a_fix_factor(fix_m: Floats, *, sigma_m: float = 1.0) -> gtsam.CustomFactor:
     )
 
 
-@settings(max_examples=25)
+@settings(max_examples=25, deadline=None)
 @given(POSES, st.floats(-3.0, 3.0), st.floats(0.8, 1.2), st.floats(-0.05, 0.05))
 def test_the_odometry_factor_has_the_derivatives_it_says(
     start: tuple[float, float, float], turned_rad: float, scale: float, bias: float
@@ -52,7 +52,7 @@ def test_the_odometry_factor_has_the_derivatives_it_says(
     assert_derivatives(an_odometry_factor(np.eye(3)), values, (3, 3, 3, 1))
 
 
-@settings(max_examples=25)
+@settings(max_examples=25, deadline=None)
 @given(POSES, METRES, METRES)
 def test_the_fix_factor_has_the_derivatives_it_says(pose: tuple[float, float, float], x_m: float, y_m: float) -> None:
     values = values_of(gtsam.Pose2(*pose), np.array([1.5, 0.4]), np.array([x_m, 1.0]), np.array([0.5, y_m]))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -101,6 +101,7 @@ def test_nor_are_they_joined_by_way_of_a_third() -> None:
 PAIRS = st.lists(st.tuples(st.integers(0, 9), st.integers(0, 9)).filter(lambda pair: pair[0] != pair[1]), max_size=20)
 
 
+@settings(deadline=None)
 @given(PAIRS, PAIRS)
 def test_no_order_of_joining_brings_together_what_was_seen_apart(
     apart: list[tuple[int, int]], wanted: list[tuple[int, int]]

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -140,6 +140,7 @@ def test_a_crawling_vehicle_gets_keyframes_by_time() -> None:
     assert len(keyframe_stamps(path, distance_m=2.0, turn_rad=0.2, moving_s=1.0)) == pytest.approx(200, abs=2)
 
 
+@settings(deadline=None)
 @given(POSES, POSES)
 def test_a_relative_pose_takes_the_one_into_the_other(
     a: tuple[float, float, float], b: tuple[float, float, float]
@@ -150,6 +151,7 @@ def test_a_relative_pose_takes_the_one_into_the_other(
     assert math.cos(back.heading_rad - b[2]) == pytest.approx(1.0, abs=1e-12)  # rounding
 
 
+@settings(deadline=None)
 @given(POSES, POSES, POSES)
 def test_relative_poses_do_not_know_the_frame(
     T: tuple[float, float, float], a: tuple[float, float, float], b: tuple[float, float, float]

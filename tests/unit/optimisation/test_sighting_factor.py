@@ -38,7 +38,7 @@ def seen_from(pose: tuple[float, float, float], point_m: Floats) -> Floats:
     return seen
 
 
-@settings(max_examples=40)
+@settings(max_examples=40, deadline=None)
 @given(POSES, METRES, METRES)
 def test_a_landmarks_sighting_has_the_derivatives_it_says(
     pose: tuple[float, float, float], x_m: float, y_m: float
@@ -49,7 +49,7 @@ def test_a_landmarks_sighting_has_the_derivatives_it_says(
     assert_derivatives(factor, values_of(gtsam.Pose2(*pose), SENSOR, np.array([x_m, y_m])), (3, 6, 2))
 
 
-@settings(max_examples=40)
+@settings(max_examples=40, deadline=None)
 @given(POSES, POSES)
 def test_another_vehicles_sighting_has_the_derivatives_it_says(
     pose: tuple[float, float, float], seen: tuple[float, float, float]

@@ -1,7 +1,7 @@
 """Detections become tracks; two things seen at once stay two."""
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -66,6 +66,7 @@ def test_no_detection_makes_no_track() -> None:
     assert len(linked(np.zeros(0, dtype=np.int64), np.zeros((0, 2)))) == 0
 
 
+@settings(deadline=None)
 @given(st.integers(2, 8), st.integers(0, 100))
 def test_one_sweep_never_gives_a_track_two_detections(count: int, seed: int) -> None:
     places_m = np.random.default_rng(seed).uniform(0.0, 5.0, (count, 2))
