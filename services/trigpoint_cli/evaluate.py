@@ -7,17 +7,15 @@ import click
 
 from trigpoint.errors import InputError
 from trigpoint.events.mapped import TrajectorySolved
-from trigpoint.events.solved import LabelReduction
-from trigpoint.logs.ports import EventLog
-from trigpoint.logs.readings import logged_maps, logged_verdicts
+from trigpoint.logs.readings import logged_verdicts
 from trigpoint_cli.build import EDGES, METHODS, edges_of
 from trigpoint_cli.data_dir import DataDirectory, data_option
 from trigpoint_cli.kept_solves import joint_covariance_m2, kept_solve
+from trigpoint_cli.leave_out import leave_out
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering, metres
 from trigpoint_cli.pipeline import Inputs, filter_drives, read_inputs, settings_for, solve, verdicts_of
 from trigpoint_cli.truth_values import truth_lines, truth_values
 from trigpoint_evaluation.app import Evaluated, evaluate_truth, logged_map, read_truth
-from trigpoint_evaluation.core.draws import LeaveOutDraws, LeaveOutResult, left_out, left_out_curve
 from trigpoint_evaluation.core.gnss import (
     FilteredPath,
     GnssEvaluation,
@@ -34,6 +32,9 @@ from trigpoint_optimisation.settings import Method, SolveSettings
 @click.group("evaluate", help="Measure a map against withheld fixes, withheld anchors or truth.")
 def command() -> None:
     """Group of the measures."""
+
+
+command.add_command(leave_out)
 
 
 @command.command("gnss")
@@ -111,76 +112,6 @@ def _gnss_line(name: str, one: GnssEvaluation) -> str:
         f"{name}: {one.withheld} fixes withheld, antenna error median {metres(one.error_m.median)}, "
         f"mean {metres(one.error_m.mean)}, p95 {metres(one.error_m.p95)}; between the paths "
         f"{metres(one.path_difference_m.median)} median; filter alone {metres(one.filter_error_m.median)} median"
-    )
-
-
-@command.command("leave-out")
-@data_option
-@click.option("--tied", type=int, metavar="N", help="Tie so many anchors; every number of them by default.")
-@click.option("--draws", type=int, default=100, show_default=True, metavar="K")
-@click.option("--seed", type=int, default=0, show_default=True, metavar="S")
-@click.option("--image", metavar="ID", help="Tie and measure the labels of this image only, or of `most-labelled`.")
-@click.option("--blocked", is_flag=True, help="Hold out labels that lie together, not at random.")
-@click.option("--known-association", is_flag=True, help="Let signatures say which landmark a label is.")
-@answering
-def leave_out(
-    data: DataDirectory,
-    tied: int | None,
-    image: str | None,
-    known_association: bool,
-    *,
-    screen: Screen,
-    **draws: int,
-) -> Answer:
-    """Tie N anchors, measure the others: label minus landmark minus image offset, over K draws.
-
-    Of the newest map version if it is anchored; else, or with --known-association, of one solved for this alone.
-    """
-    settings = LeaveOutDraws(draws=draws["draws"], seed=draws["seed"], blocked=bool(draws["blocked"]))
-    with data.opened_log() as log:
-        reduction = _reduction(data, log, screen, known_association=known_association)
-    results: tuple[LeaveOutResult, ...]
-    if tied is not None:
-        results = (left_out(reduction, tied, settings, image=image),)
-    else:
-        with screen.part_of("leaving out") as progress:
-            results = left_out_curve(reduction, settings, image=image, progress=progress)
-    if not results:
-        raise InputError("no anchor is tied to a landmark: there is nothing to leave out")
-    values = _leave_out_values(results[-1]) | {"blocked": settings.blocked, "image": image}
-    if tied is None:
-        values["curve"] = [_leave_out_values(result) for result in results]
-    return Answer(values, tuple(map(_leave_out_line, results)))
-
-
-def _reduction(data: DataDirectory, log: EventLog, screen: Screen, *, known_association: bool) -> LabelReduction:
-    """The newest map version's, as its build kept it; else of a solve now: anchored, from all the log holds."""
-    maps = logged_maps(log)
-    if maps and maps[-1].head.method == "anchored" and not known_association:
-        kept = kept_solve(data, maps[-1].head.map_version)
-        if kept is not None:
-            return kept.reduction
-    inputs = read_inputs(log, screen)
-    settings = settings_for("anchored", inputs.anchors, known_association=known_association)
-    return solve(inputs, settings, screen, verdicts=logged_verdicts(log)).reduction()
-
-
-def _leave_out_values(result: LeaveOutResult) -> JsonObject:
-    return {
-        "tied": result.tied,
-        "anchors": {"count": result.count},
-        "draws": result.draws,
-        "undetermined": result.undetermined,
-        "error_m": result.error_m,
-        "band_m": {"p5": result.band_m[0], "p95": result.band_m[1]},
-    }
-
-
-def _leave_out_line(result: LeaveOutResult) -> str:
-    return (
-        f"{result.tied} of {result.count} tied: the others' error mean {metres(result.error_m.mean)}, "
-        f"p95 {metres(result.error_m.p95)}; {result.draws} draws, their means {metres(result.band_m[0])} to "
-        f"{metres(result.band_m[1])}"
     )
 
 

@@ -1,13 +1,14 @@
 """Whether the linear reduction says of held-out labels what a full solve says."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trigpoint.events.solved import LabelReduction
 from trigpoint_evaluation.core.leave_out import held_out_of, held_out_residuals_m, linear_labels
+from trigpoint_evaluation.core.summary import ErrorSummary, summary_of
 from trigpoint_optimisation.core.anchoring import UNASSIGNED
 from trigpoint_optimisation.core.fleet import solved_state
 from trigpoint_optimisation.core.stages import Solved, full_graph
@@ -17,11 +18,20 @@ Ints = NDArray[np.int64]
 Progress = Callable[[int, int], None]
 
 
-def re_solve_differences_m(solved: Solved, reduction: LabelReduction, tied: Ints, progress: Progress) -> Floats:
-    """Distances (k, h) in m between the held-out labels' predictions by the reduction and by full solves.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Agreement:
+    """How the reduction's predictions differ from full solves': `prediction_m` label by label, `mean_error_m` in the
+    mean error over all draws, which is what is reported."""
 
-    `tied` (k, n) are draws of the reduction's label numbers; each full solve ties those labels to the landmarks they
-    are tied to in `solved`, and no others.
+    draws: int
+    prediction_m: ErrorSummary
+    mean_error_m: float
+
+
+def agreement_with_re_solves(solved: Solved, reduction: LabelReduction, tied: Ints, progress: Progress) -> Agreement:
+    """The agreement over draws `tied` (k, n) of the reduction's label numbers.
+
+    Each full solve ties a draw's labels to the landmarks they are tied to in `solved`, and no others.
     """
     linear = held_out_residuals_m(linear_labels(reduction), tied)
     held_out = held_out_of(len(reduction.labels), tied, np.arange(len(reduction.labels)))
@@ -29,8 +39,12 @@ def re_solve_differences_m(solved: Solved, reduction: LabelReduction, tied: Ints
     for draw in range(len(tied)):
         full[draw] = _full_residuals_m(solved, reduction, tied[draw], held_out[draw])
         progress(draw + 1, len(tied))
-    away_m: Floats = np.linalg.norm(full - linear, axis=-1)
-    return away_m
+    error_m = np.linalg.norm(linear, axis=-1).mean() - np.linalg.norm(full, axis=-1).mean()
+    return Agreement(
+        draws=len(tied),
+        prediction_m=summary_of(np.linalg.norm(full - linear, axis=-1)),
+        mean_error_m=float(abs(error_m)),
+    )
 
 
 def _full_residuals_m(solved: Solved, reduction: LabelReduction, tied: Ints, held_out: Ints) -> Floats:

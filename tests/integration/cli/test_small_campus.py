@@ -166,6 +166,14 @@ def test_anchors_from_the_wrong_hemisphere_are_refused_and_the_map_stays(campus:
 
 
 @pytest.mark.slow
+def test_full_solves_agree_with_the_reduction(campus: BuiltCampus) -> None:
+    words = ("--tied", 10, "--draws", 2, "--seed", 1, "--re-solve")
+    answer = trigpoint("evaluate", "leave-out", "--data", campus.data, *words, "--json").answer
+    assert answer["re_solve"]["mean_error_m"] < 0.005
+    assert answer["re_solve"]["prediction_difference_m"]["count"] == answer["error_m"]["count"]
+
+
+@pytest.mark.slow
 def test_withheld_fixes_are_measured_against_a_solve_without_them(campus: BuiltCampus) -> None:
     words = ("--withhold-period-s", 60, "--withhold-duration-s", 20, "--withhold-offset-s", 10)
     answer = trigpoint("evaluate", "gnss", "--data", campus.data, *words, "--json").answer
