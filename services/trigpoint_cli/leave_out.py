@@ -58,9 +58,7 @@ def leave_out(
     with data.opened_log() as log:
         measured = _measured(data, log, screen, anew=bool(chosen["re_solve"]), known=bool(chosen["known_association"]))
     if not measured.reduction.labels:
-        raise InputError(
-            f"none of {measured.anchor_count} anchors is tied to a landmark: nothing can be left out"
-        )
+        raise InputError(f"none of {measured.anchor_count} anchors is tied to a landmark: nothing can be left out")
     if tied is None:
         return _curve_answer(measured, settings, image, screen)
     result = left_out(measured.reduction, _with_landmark(measured, tied, image), settings, image=image)
