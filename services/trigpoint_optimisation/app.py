@@ -1,5 +1,6 @@
 """Optimisation at work on a log: what it holds is solved and appended as the next map version."""
 
+import logging
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -22,6 +23,8 @@ from trigpoint.logs.readings import (
 )
 from trigpoint_optimisation.core.solve import Solution, solve_map
 from trigpoint_optimisation.settings import SolveSettings, settings_json
+
+logger = logging.getLogger(__name__)
 
 SOURCE = "optimisation"
 STREAM = STREAM_PATTERNS[MapSolved]
@@ -58,6 +61,8 @@ def build(log: EventLog, settings: SolveSettings, *, progress: Callable[[str, fl
         verdicts=logged_verdicts(log),
         progress=progress,
     )
+    for left_out in solution.left_out:
+        logger.warning("%s", left_out)
     events = solution.map.events()
     version = newest_version(log) + 1
     head = replace(solution.map.head, inputs=inputs, wall_s=time.monotonic() - begun_s)

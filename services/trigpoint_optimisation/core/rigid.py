@@ -1,7 +1,7 @@
 """The local map as one rigid body, brought onto its fixes by a single SE(2) motion."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import gtsam
 import numpy as np
@@ -11,9 +11,10 @@ from trigpoint.errors import AlignmentRefused
 from trigpoint.geodesy.poses import transform_points, wrap_angles_rad
 from trigpoint_optimisation.core.alignment import RigidAlignment, rigid_alignment
 from trigpoint_optimisation.core.fleet import Fleet, motion_graph, solved_state
-from trigpoint_optimisation.core.graph import add_sightings
+from trigpoint_optimisation.core.graph import add_sightings, add_single_sightings
 from trigpoint_optimisation.core.placing import FIX_SIGMA_M
 from trigpoint_optimisation.core.sightings import Sightings
+from trigpoint_optimisation.core.single_sightings import SingleSightings
 from trigpoint_optimisation.core.state import MapState, pose_key
 
 Floats = NDArray[np.float64]
@@ -22,38 +23,61 @@ Ints = NDArray[np.int64]
 SLOW_TIME_S = 300.0  # fixes this close in time share their slow error
 
 
-def connected_drives(sightings: Sightings, landmark: Ints, drive_count: int) -> tuple[tuple[int, ...], ...]:
-    """Groups of drives that see common landmarks, directly or through others."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Seen:
+    """Everything a fleet saw: averaged sightings with the `landmark` (s,) each is of, and single ones."""
+
+    sightings: Sightings
+    landmark: Ints
+    singles: SingleSightings
+
+    def seers(self) -> Ints:
+        """(drive, landmark) of every sighting of a landmark (k, 2), without repetition."""
+        averaged = np.column_stack([self.sightings.drive, self.landmark])
+        pairs = np.concatenate([averaged, np.column_stack([self.singles.drive, self.singles.landmark])])
+        return np.unique(pairs[pairs[:, 1] >= 0], axis=0)
+
+    def links(self) -> list[set[int]]:
+        """Sets of drives that see one landmark, or one the other."""
+        seers, of_vehicle = self.seers(), self.singles.seen_drive >= 0
+        common = [{int(d) for d in seers[seers[:, 1] == number, 0]} for number in np.unique(seers[:, 1])]
+        met = zip(self.singles.drive[of_vehicle], self.singles.seen_drive[of_vehicle], strict=True)
+        return common + [{int(one), int(other)} for one, other in set(met)]
+
+
+def connected_drives(seen: Seen, drive_count: int) -> tuple[tuple[int, ...], ...]:
+    """Groups of drives that see common landmarks or one another, directly or through others."""
     group = list(range(drive_count))
-    for number in np.unique(landmark[landmark >= 0]):
-        seen_by = np.unique(sightings.drive[landmark == number])
-        joined = {group[drive] for drive in seen_by}
+    for linked in seen.links():
+        joined = {group[drive] for drive in linked}
         group = [min(joined) if own in joined else own for own in group]
     return tuple(tuple(d for d in range(drive_count) if group[d] == name) for name in sorted(set(group)))
 
 
-def rigid_state(fleet: Fleet, state: MapState, sightings: Sightings, landmark: Ints) -> MapState:
+def rigid_state(fleet: Fleet, state: MapState, seen: Seen) -> MapState:
     """The state solved from odometry and landmarks alone, each connected group then moved onto its fixes as one.
 
-    `landmark` (s,) by sighting. Raises AlignmentRefused for a group whose path is nearly straight or stationary.
+    Raises AlignmentRefused for a group whose path is nearly straight or stationary.
     """
-    groups = connected_drives(sightings, landmark, len(fleet.prepared))
+    groups = connected_drives(seen, len(fleet.prepared))
     bare = replace(
         state,
         drives=tuple(replace(drive, fix_bias_m=np.zeros((0, 2))) for drive in state.drives),
         image_m=np.zeros((0, 2)),
     )
-    local = solved_state(rigid_graph(fleet, bare, sightings, landmark), bare)
+    local = solved_state(rigid_graph(fleet, bare, seen), bare)
     for group in groups:
-        local = _moved(local, group, _group_alignment(fleet, local, group), sightings, landmark)
+        local = _moved(local, group, _group_alignment(fleet, local, group), seen)
     return local
 
 
-def rigid_graph(fleet: Fleet, state: MapState, sightings: Sightings, landmark: Ints) -> gtsam.NonlinearFactorGraph:
+def rigid_graph(fleet: Fleet, state: MapState, seen: Seen) -> gtsam.NonlinearFactorGraph:
     """Odometry and landmarks, each connected group held where the state has it, as surely as its fixes could say."""
     graph = motion_graph(fleet)
-    add_sightings(graph, sightings, landmark, cauchy_scale=fleet.settings.detections.cauchy_scale)
-    for group in connected_drives(sightings, landmark, len(fleet.prepared)):
+    kernels = fleet.settings.detections
+    add_sightings(graph, seen.sightings, seen.landmark, cauchy_scale=kernels.cauchy_scale)
+    add_single_sightings(graph, seen.singles, cauchy_scale=kernels.single_cauchy_scale)
+    for group in connected_drives(seen, len(fleet.prepared)):
         d = group[0]
         middle = len(state.drives[d].pose) // 2
         held = gtsam.noiseModel.Diagonal.Sigmas(_held_sigmas(fleet, state, d))
@@ -88,9 +112,7 @@ def _group_alignment(fleet: Fleet, state: MapState, group: tuple[int, ...]) -> R
         raise AlignmentRefused(f"{names}: {error}") from error
 
 
-def _moved(
-    state: MapState, group: tuple[int, ...], alignment: RigidAlignment, sightings: Sightings, landmark: Ints
-) -> MapState:
+def _moved(state: MapState, group: tuple[int, ...], alignment: RigidAlignment, seen: Seen) -> MapState:
     """The state with the group's poses and landmarks moved by the alignment."""
     T_map_path = np.array([alignment.T_map_path.x_m, alignment.T_map_path.y_m, alignment.T_map_path.heading_rad])
     drives = list(state.drives)
@@ -99,6 +121,7 @@ def _moved(
         heading = wrap_angles_rad(pose[:, 2] + T_map_path[2])
         drives[d] = replace(drives[d], pose=np.column_stack([transform_points(T_map_path, pose[:, :2]), heading]))
     point = state.landmark_m.copy()
-    own = np.unique(landmark[np.isin(sightings.drive, group) & (landmark >= 0)])
+    seers = seen.seers()
+    own = np.unique(seers[np.isin(seers[:, 0], group), 1])
     point[own] = transform_points(T_map_path, point[own])
     return replace(state, drives=tuple(drives), landmark_m=point)

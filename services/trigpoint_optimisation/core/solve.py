@@ -16,6 +16,7 @@ from trigpoint.events.solved import LabelReduction, SolvedMap
 from trigpoint.geodesy.projection import MapFrame
 from trigpoint_optimisation.core.anchoring import residuals_m
 from trigpoint_optimisation.core.fleet import Progress
+from trigpoint_optimisation.core.fleet_placing import LeftOut
 from trigpoint_optimisation.core.marginals import covariance_of, pose_covariances
 from trigpoint_optimisation.core.odometry import TurnSource
 from trigpoint_optimisation.core.preparation import PreparedDrive
@@ -37,6 +38,14 @@ Bools = NDArray[np.bool_]
 
 TRAJECTORY_STEP_S = 0.5
 COVARIANCE_POSES = 150  # per drive; between them covariances are interpolated
+CAMERA_CALIBRATION = (  # the states of `sighting_factor`, in their order
+    "camera_ln_range",
+    "camera_ln_range_per_rad",
+    "camera_ln_range_per_rad2",
+    "camera_ahead_m",
+    "camera_bearing_rad",
+    "camera_bearing_scale",
+)
 UNNUMBERED = 0  # a map version until the log gives it its number
 
 
@@ -56,6 +65,11 @@ class Solution:
     def map(self) -> SolvedMap:
         """The map as events of version UNNUMBERED, without wall time and inputs."""
         return _solved_map(self.solved, landmark_covariance=self.landmark_covariance)
+
+    @property
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """The drives that could not be placed, and why."""
+        return self.solved.left_out
 
     def reduction(self) -> LabelReduction:
         """Everything but the labels marginalised onto the labelled landmarks, at the solution."""
@@ -121,6 +135,8 @@ def _calibration(each: PreparedDrive, drive: DriveState) -> tuple[tuple[str, flo
         "antenna_x_m": float(drive.antenna_m[0]),
         "antenna_y_m": float(drive.antenna_m[1]),
     }
+    if each.camera:
+        values |= dict(zip(CAMERA_CALIBRATION, drive.sensor.tolist(), strict=True))
     return tuple((name, value, float("nan")) for name, value in values.items())
 
 

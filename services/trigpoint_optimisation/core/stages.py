@@ -44,7 +44,7 @@ from trigpoint_optimisation.core.fleet import (
 from trigpoint_optimisation.core.fleet_placing import LeftOut, PlacedFleet, drivable, placed_fleet
 from trigpoint_optimisation.core.graph import add_labels, add_sightings, add_single_sightings
 from trigpoint_optimisation.core.marginals import Reduced, covariance_of, reduced
-from trigpoint_optimisation.core.rigid import rigid_graph, rigid_state
+from trigpoint_optimisation.core.rigid import Seen, rigid_graph, rigid_state
 from trigpoint_optimisation.core.sightings import Sightings
 from trigpoint_optimisation.core.single_sightings import SingleSightings
 from trigpoint_optimisation.core.state import MapState, image_key, landmark_key, values_of
@@ -98,8 +98,7 @@ def solve_fleet(
     placed = placed_fleet(fleet, signed_points(labels), left_out=left_out, progress=progress)
     solved = _with_landmarks(placed, no_labels()[0] if placed.by_fixes else labels, progress)
     if settings.method == "rigid":
-        landmark = solved.association.landmark_of_track[solved.sightings.track]
-        return replace(solved, state=rigid_state(solved.fleet, solved.state, solved.sightings, landmark))
+        return replace(solved, state=rigid_state(solved.fleet, solved.state, seen_by(solved)))
     if settings.method == "anchored":
         solved = anchored(solved, labels, progress=progress)
     return solved
@@ -183,18 +182,23 @@ def with_fix_bias(state: MapState) -> bool:
     return any(len(drive.fix_bias_m) for drive in state.drives)
 
 
+def seen_by(solved: Solved) -> Seen:
+    """Everything the fleet saw, under the association."""
+    landmark = solved.association.landmark_of_track[solved.sightings.track]
+    return Seen(sightings=solved.sightings, landmark=landmark, singles=solved.singles)
+
+
 def full_graph(
     solved: Solved, *, with_labels: bool = True, single_cauchy_scale: float | None = None
 ) -> gtsam.NonlinearFactorGraph:
     """The graph of a solve: odometry, fixes, landmarks, and labels if wanted; kernels on fixes, landmarks, labels."""
-    settings = solved.fleet.settings
-    landmark = solved.association.landmark_of_track[solved.sightings.track]
+    settings, seen = solved.fleet.settings, seen_by(solved)
     if settings.method == "rigid" and not with_fix_bias(solved.state):
-        return rigid_graph(solved.fleet, solved.state, solved.sightings, landmark)
+        return rigid_graph(solved.fleet, solved.state, seen)
     graph = georeferenced_graph(solved.fleet, robust=True)
-    add_sightings(graph, solved.sightings, landmark, cauchy_scale=settings.detections.cauchy_scale)
+    add_sightings(graph, seen.sightings, seen.landmark, cauchy_scale=settings.detections.cauchy_scale)
     kernel = single_cauchy_scale or settings.detections.single_cauchy_scale
-    add_single_sightings(graph, solved.singles, cauchy_scale=kernel)
+    add_single_sightings(graph, seen.singles, cauchy_scale=kernel)
     if with_labels:
         tied, _ = tied_labels(solved.labels, solved.assignment)
         add_labels(graph, tied, cauchy_scale=None)

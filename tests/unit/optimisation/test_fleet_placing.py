@@ -141,3 +141,24 @@ def test_signatures_decide_which_landmark_a_detection_is_of(two: World) -> None:
     found = solved(two.drives)
     names = {name for drive in two.drives for name in drive.detections.signature}
     assert found.association.landmark_count == len(names)
+
+
+def test_a_rigid_map_holds_a_drive_without_fixes_by_common_landmarks(two: World) -> None:
+    found = solved((two.drives[0], without_fixes(two.drives[1])), method="rigid")
+    assert path_error_m(found, "van", two.poses[1]) < path_error_m(found, "car", two.poses[0]) + 0.5  # m
+
+
+def test_a_straight_drive_is_refused_a_rigid_place_and_given_a_loose_one() -> None:
+    straight = world(replace(CAR, begin_rad=np.pi / 2 - 0.15, duration_s=4.0))
+    with pytest.raises(AlignmentRefused, match="car: nearly"):
+        solved(straight.drives, method="rigid")
+    assert path_error_m(solved(straight.drives), "car", straight.poses[0]) < 4.0  # m: fixes are off by 1.5
+
+
+def test_a_rigid_map_holds_a_camera_by_what_it_sees(two: World) -> None:
+    # As a camera the van has no averaged sightings: its single ones alone tie it to the car's landmarks.
+    van = two.drives[1]
+    camera = replace(without_fixes(van), described=replace(van.described, landmark_sensor_model="camera"))
+    found = solved((two.drives[0], camera), method="rigid")
+    assert set(found.sightings.drive.tolist()) == {0}
+    assert path_error_m(found, "van", two.poses[1]) < path_error_m(found, "car", two.poses[0]) + 1.0  # m
