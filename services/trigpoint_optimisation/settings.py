@@ -22,6 +22,8 @@ class FixSettings:
 
 # Yi, Worrall and Nebot, section III-B: one edge every 10 m of travel, sigma 5 m east and north.
 PAPER_EDGES = FixSettings(spacing_m=10.0, sigma_m=5.0, bias_sigma_m=0.0, bias_time_s=1.0, cauchy_scale=2.0)
+# Each fix says so little that a hundred wrong ones in a row do not bend the path: to decide which fixes to trust.
+SELECTION_EDGES = FixSettings(spacing_m=1.0, sigma_m=15.0, bias_sigma_m=0.0, bias_time_s=1.0, cauchy_scale=0.3)
 # The error of real receivers is correlated over tens of seconds: white part and slow part apart.
 HONEST_EDGES = FixSettings(spacing_m=2.0, sigma_m=1.5, bias_sigma_m=2.5, bias_time_s=300.0, cauchy_scale=2.0)
 
@@ -33,7 +35,7 @@ class CalibrationPriors:
     speed_scale: float = 0.03
     turn_scale_imu: float = 0.005
     turn_scale_steering: float = 0.10
-    turn_scale_wheels: float = 0.20
+    turn_scale_wheels: float = 0.05
     turn_bias_imu_radps: float = 0.01
     turn_bias_steering_rad: float = 0.03
     turn_bias_wheels_radpm: float = 0.02
@@ -68,7 +70,7 @@ class OdometrySettings:
     floor_rad: float = 0.0005
     floor_imu_rad: float = 0.00005
     keyframe_m: float = 2.0
-    keyframe_rad: float = 0.2
+    keyframe_rad: float = 0.5
     keyframe_moving_s: float = 1.0  # slow vehicles: a keyframe after so long in motion
     command_m_per_sqrt_s: float = 0.015
     command_across_m_per_sqrt_s: float = 0.002

@@ -34,26 +34,35 @@ def odometry_factor(
     """
     key_from, key_to, key_scale, key_bias = keys
     by_scale, by_bias = -derivative[:, :3], -derivative[:, 3:]
+    rows = np.column_stack([derivative, delta - derivative @ reference]).tolist()  # plain floats: called very often
 
     def error(_: gtsam.CustomFactor, values: gtsam.Values, jacobians: Jacobians) -> Floats:
         start, end = values.atPose2(key_from), values.atPose2(key_to)
-        scale, bias = values.atVector(key_scale), values.atVector(key_bias)
-        expected = delta + derivative @ np.array([*scale, *bias]) - derivative @ reference
-        c, s = math.cos(start.theta()), math.sin(start.theta())
+        speed, turn, delay = values.atVector(key_scale).tolist()
+        bias = float(values.atVector(key_bias)[0])
+        expected = [r[0] * speed + r[1] * turn + r[2] * delay + r[3] * bias + r[4] for r in rows]
+        heading = start.theta()
+        c, s = math.cos(heading), math.sin(heading)
         east, north = end.x() - start.x(), end.y() - start.y()
         ahead, left = c * east + s * north, c * north - s * east
-        turned = end.theta() - start.theta()
-        unit = np.array([1.0 / scale[0], 1.0 / scale[0], 1.0 / scale[1]])
-        residual: Floats = unit * (ahead - expected[0], left - expected[1], wrap_angle_rad(turned - expected[2]))
+        turned = end.theta() - heading
+        residual = np.array(
+            [
+                (ahead - expected[0]) / speed,
+                (left - expected[1]) / speed,
+                wrap_angle_rad(turned - expected[2]) / turn,
+            ]
+        )
         if jacobians is not None:
-            ct, st = math.cos(turned), math.sin(turned)
-            row = unit[:, None]
-            jacobians[0] = row * np.array([[-1.0, 0.0, left], [0.0, -1.0, -ahead], [0.0, 0.0, -1.0]])
-            jacobians[1] = row * np.array([[ct, -st, 0.0], [st, ct, 0.0], [0.0, 0.0, 1.0]])
-            jacobians[2] = row * by_scale
-            jacobians[2][:2, 0] -= residual[:2] * unit[0]
-            jacobians[2][2, 1] -= residual[2] * unit[2]
-            jacobians[3] = row * by_bias
+            ct, st = math.cos(turned) / speed, math.sin(turned) / speed
+            u, w = 1.0 / speed, 1.0 / turn
+            unit = np.array([[u], [u], [w]])
+            jacobians[0] = np.array([[-u, 0.0, left * u], [0.0, -u, -ahead * u], [0.0, 0.0, -w]])
+            jacobians[1] = np.array([[ct, -st, 0.0], [st, ct, 0.0], [0.0, 0.0, w]])
+            jacobians[2] = unit * by_scale
+            jacobians[2][:2, 0] -= residual[:2] * u
+            jacobians[2][2, 1] -= residual[2] * w
+            jacobians[3] = unit * by_bias
         return residual
 
     return gtsam.CustomFactor(gtsam.noiseModel.Gaussian.Covariance(covariance), list(keys), error)

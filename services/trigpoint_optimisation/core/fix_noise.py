@@ -14,7 +14,8 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 SIGMAS_PER_MAD = 1.4826  # of a normal distribution
-WHITE_LIMITS_M = (0.3, 5.0)
+WHITE_MOST_M = 5.0
+WHITE_LEAST_SHARE = 0.5  # of the slow sigma: a slow error that slides faster than the model must not bend the path
 SLOW_MOST_M = 8.0
 NEIGHBOUR_S = 2.5  # two fixes this close in time share their slow error
 MIN_PAIRS = 20
@@ -47,11 +48,11 @@ def measured_fix_settings(
         return fixes
     white = _sigma(np.diff(residual, axis=0)[near]) / np.sqrt(2.0)
     total = _sigma(residual)
-    slow = np.sqrt(max(total**2 - white**2, 0.0))
+    slow_m = float(np.clip(np.sqrt(max(total**2 - white**2, 0.0)), fixes.bias_sigma_m, SLOW_MOST_M))
     return replace(
         fixes,
-        sigma_m=float(np.clip(white, *WHITE_LIMITS_M)),
-        bias_sigma_m=float(np.clip(slow, fixes.bias_sigma_m, SLOW_MOST_M)),
+        sigma_m=float(np.clip(white, WHITE_LEAST_SHARE * slow_m, WHITE_MOST_M)),
+        bias_sigma_m=slow_m,
     )
 
 

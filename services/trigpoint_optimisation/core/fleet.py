@@ -12,7 +12,7 @@ from trigpoint.geodesy.poses import transform_points
 from trigpoint.geodesy.projection import MapFrame
 from trigpoint_optimisation.core.detection_noise import DetectionNoise, nominal_noise
 from trigpoint_optimisation.core.fix_noise import measured_fix_settings
-from trigpoint_optimisation.core.gauss_newton import solved
+from trigpoint_optimisation.core.gauss_newton import MAX_ITERATIONS, solved
 from trigpoint_optimisation.core.graph import add_fixes, chosen_fixes, fix_bias_stamps, fleet_graph
 from trigpoint_optimisation.core.odometry import OdometryCalibration
 from trigpoint_optimisation.core.preparation import PreparedDrive, nominal_calibration, prepared_drive
@@ -139,7 +139,9 @@ def georeferenced_graph(fleet: Fleet, *, robust: bool) -> gtsam.NonlinearFactorG
     return graph
 
 
-def solved_state(graph: gtsam.NonlinearFactorGraph, state: MapState, *, max_iterations: int = 30) -> MapState:
+def solved_state(
+    graph: gtsam.NonlinearFactorGraph, state: MapState, *, max_iterations: int = MAX_ITERATIONS
+) -> MapState:
     """The state at the minimum of the graph's cost nearest to `state`."""
     values = values_of(state)
     return state_of(solved(graph, values, last=shared_keys(values), max_iterations=max_iterations), state)

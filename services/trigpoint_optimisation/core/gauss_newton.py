@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import gtsam
 
-MAX_ITERATIONS = 30
-MAX_HALVINGS = 6
-RELATIVE_TOLERANCE = 1e-4  # of the cost, per iteration
+MAX_ITERATIONS = 15
+MAX_HALVINGS = 4
+RELATIVE_TOLERANCE = 3e-4  # of the cost, per iteration
 ABSOLUTE_TOLERANCE = 1e-3  # of the cost, dimensionless
 
 

@@ -2,7 +2,11 @@
 
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from trigpoint.errors import AlignmentRefused
+from trigpoint_optimisation.core.fix_noise import fix_residuals
 from trigpoint_optimisation.core.fleet import (
     Fleet,
     Progress,
@@ -15,26 +19,37 @@ from trigpoint_optimisation.core.fleet import (
 )
 from trigpoint_optimisation.core.placing import placed_by_fixes
 from trigpoint_optimisation.core.state import MapState
+from trigpoint_optimisation.settings import SELECTION_EDGES
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 PLACINGS = 2  # the second one with the calibration the first one led to
+TRUST_M = 12.0  # a fix further than this from the robust path is not trusted: five sigmas of a usual slow error
+LONG_OUTAGE_S = 60.0  # before and after an outage longer than this,
+BEFORE_OUTAGE_S = 30.0  # a receiver that lost its satellites extrapolates for so long,
+AFTER_OUTAGE_S = 5.0  # and needs so long to settle again
 
 
 def georeferenced(fleet: Fleet, *, progress: Progress) -> tuple[Fleet, MapState]:
-    """The fleet with calibrated motions and inconsistent fixes no longer trusted, and its state.
+    """The fleet with calibrated motions and only fixes trusted that agree with the path, and its state.
 
-    Plain solves first, then one with the robust kernel on fixes. Raises AlignmentRefused with the drive's name
-    when its fixes do not determine its path.
+    A plain solve first, then robust ones, all in which a fix says little; they decide about each fix; then the solve
+    with the settings' edges. Raises AlignmentRefused with the drive's name when its fixes do not determine its path.
     """
     allowed, state = fleet.trusted, None
     for turn in range(PLACINGS):
-        placed = [_placed(fleet, index, allowed) for index in range(len(fleet.prepared))]
+        earlier = [None] * len(allowed) if state is None else [drive.pose for drive in state.drives]
+        placed = [_placed(fleet, index, allowed[index], earlier[index]) for index in range(len(fleet.prepared))]
         pose = [each for each, _ in placed]
         fleet = replace(fleet, trusted=tuple(consistent for _, consistent in placed))
         state = nominal_state(fleet, pose) if state is None else with_poses(state, pose)
-        state = solved_state(georeferenced_graph(fleet, robust=False), state)
+        state = _weakly_solved(fleet, state, robust=turn > 0)
         fleet = recalibrated(fleet, state)
-        progress("odometry and fixes", (turn + 1) / (PLACINGS + 1))
+        progress("odometry and fixes", (turn + 1) / (PLACINGS + 2))
     assert state is not None
+    fleet, state = _selected(fleet, state, allowed)
+    progress("odometry and fixes", (PLACINGS + 1) / (PLACINGS + 2))
     if fleet.settings.edges == "honest":
         fleet, state = with_measured_fixes(fleet, state)
     state = solved_state(georeferenced_graph(fleet, robust=True), state)
@@ -42,9 +57,41 @@ def georeferenced(fleet: Fleet, *, progress: Progress) -> tuple[Fleet, MapState]
     return recalibrated(fleet, state), state
 
 
-def _placed(fleet: Fleet, index: int, allowed):  # type: ignore[no-untyped-def]
+def _weakly_solved(fleet: Fleet, state: MapState, *, robust: bool) -> MapState:
+    """The state of a solve in which a fix says little."""
+    weak = replace(fleet, fixes=(SELECTION_EDGES,) * len(fleet.prepared))
+    bare = replace(state, drives=tuple(replace(drive, fix_bias_m=np.zeros((0, 2))) for drive in state.drives))
+    found = solved_state(georeferenced_graph(weak, robust=robust), bare)
+    drives = tuple(
+        replace(drive, fix_bias_m=np.zeros_like(old.fix_bias_m))
+        for drive, old in zip(found.drives, state.drives, strict=True)
+    )
+    return replace(found, drives=drives)
+
+
+def _selected(fleet: Fleet, state: MapState, allowed: tuple[Bools, ...]) -> tuple[Fleet, MapState]:
+    """The fleet with the allowed fixes trusted that lie near the path of a robust solve, and that path's state."""
+    found = _weakly_solved(replace(fleet, trusted=allowed), state, robust=True)
+    trusted = []
+    for each, drive, mask in zip(fleet.prepared, found.drives, allowed, strict=True):
+        near = np.hypot(*fix_residuals(each, drive).T) <= TRUST_M
+        trusted.append(mask & each.fix_usable & near & settled(each.drive.fixes.stamp_ns))
+    return replace(recalibrated(fleet, found), trusted=tuple(trusted)), found
+
+
+def settled(stamp_ns: NDArray[np.int64]) -> Bools:
+    """Which fixes (n,), sorted by time, are neither the last before nor the first after a long outage."""
+    outage = np.nonzero(np.diff(stamp_ns) > LONG_OUTAGE_S * 1e9)[0]
+    keep = np.ones(len(stamp_ns), dtype=bool)
+    for last in outage:
+        keep &= ~((stamp_ns <= stamp_ns[last]) & (stamp_ns > stamp_ns[last] - BEFORE_OUTAGE_S * 1e9))
+        keep &= ~((stamp_ns >= stamp_ns[last + 1]) & (stamp_ns < stamp_ns[last + 1] + AFTER_OUTAGE_S * 1e9))
+    return keep
+
+
+def _placed(fleet: Fleet, index: int, allowed: Bools, solved: Floats | None) -> tuple[Floats, Bools]:
     prepared = fleet.prepared[index]
     try:
-        return placed_by_fixes(prepared, allowed[index], point_scale=fleet.frame.point_scale)
+        return placed_by_fixes(prepared, allowed, point_scale=fleet.frame.point_scale, solved=solved)
     except AlignmentRefused as error:
         raise AlignmentRefused(f"vehicle {prepared.drive.vehicle}, drive {prepared.drive.boot_id}: {error}") from error

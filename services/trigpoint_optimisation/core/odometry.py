@@ -161,11 +161,10 @@ def dead_reckon(drive: Drive, calibration: OdometryCalibration, *, max_gap_s: fl
 
 def _sampling_variance(step: Floats, dt_s: Floats) -> Floats:
     """Variance (n,) accumulated since the start by integrating a sampled rate: a rate that changes by d between
-    neighbouring samples leaves its integral over dt uncertain by about d dt / sqrt(12) (uniform in between)."""
+    neighbouring samples may be aliased: its integral over dt is uncertain by d dt / sqrt(2), the spread of a sample."""
     rate = np.divide(step, dt_s, out=np.zeros_like(step), where=dt_s > 0.0)
     change = np.abs(np.diff(rate, prepend=rate[:1]))
-    change = np.maximum(change, np.append(change[1:], 0.0)) if len(change) else change
-    return np.concatenate([[0.0], np.cumsum((change * dt_s) ** 2 / 12.0)])
+    return np.concatenate([[0.0], np.cumsum((change * dt_s) ** 2 / 2.0)])
 
 
 def keyframe_stamps(path: DeadReckonedPath, *, distance_m: float, turn_rad: float, moving_s: float) -> Ints:

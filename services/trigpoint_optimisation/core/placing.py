@@ -3,21 +3,86 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from trigpoint.geodesy.poses import wrap_angles_rad
+from trigpoint.geodesy.poses import transform_points, wrap_angles_rad
 from trigpoint_optimisation.core.alignment import bent_alignment, turned_path
+from trigpoint_optimisation.core.chordal import chordal_poses
+from trigpoint_optimisation.core.odometry import relative_poses
 from trigpoint_optimisation.core.preparation import PreparedDrive
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
+LINEAR_SIGMA_M = 15.0  # of one fix in the linear solve: fixes a second apart share their error
+LINEAR_CAUCHY_M = 4.5  # beyond this a fix counts ever less in the linear solve
+LINEAR_GATE_M = 12.0  # from the linear solve's path: a fix beyond it does not agree
+CALIBRATION_INFORMATION = (1e2, 1e2, 1e2, 1e3)  # of speed scale, turn scale, delay (1/s^2), turn bias: weak priors
 FIX_SIGMA_M = 2.0  # scale at which a fix's disagreement with the bent path begins to count less
 
 
-def placed_by_fixes(prepared: PreparedDrive, allowed: Bools, *, point_scale: float) -> tuple[Floats, Bools]:
-    """Keyframe poses (n, 3) in the map, bent to the allowed fixes (f,), and which fixes agree with one another.
+def placed_by_fixes(
+    prepared: PreparedDrive, allowed: Bools, *, point_scale: float, solved: Floats | None = None
+) -> tuple[Floats, Bools]:
+    """Keyframe poses (n, 3) in the map by the allowed fixes (f,), and which fixes agree with the path.
 
+    Two ways that need no first guess, and the one the odometry and the fixes contradict less: the path bent to its
+    fixes, good where odometry is sure over tens of metres; and the linear chordal solve, good where it is not.
+    `solved` (n, 3), if given, are poses of an earlier solve that stand beside the two.
     Raises AlignmentRefused when the fixes do not determine the path.
     """
+    pose, consistent = _bent(prepared, allowed, point_scale=point_scale)
+    usable = allowed & prepared.fix_usable
+    linear = _chordal(prepared, usable, point_scale=point_scale)
+    others = [linear] if solved is None else [linear, solved]
+    best = min(others, key=lambda other: _contradiction(prepared, other, usable, point_scale))
+    if _contradiction(prepared, best, usable, point_scale) < _contradiction(prepared, pose, usable, point_scale):
+        off_m = np.hypot(*(prepared.fix_m - _antennas(prepared, best, point_scale)).T)
+        return best, usable & (off_m <= LINEAR_GATE_M)
+    return pose, consistent
+
+
+def _arms(prepared: PreparedDrive, point_scale: float) -> Floats:
+    """The nominal antenna (f, 2) at each fix in its keyframe's frame, m."""
+    described = prepared.drive.described
+    arm = point_scale * np.array([described.antenna_x_m, described.antenna_y_m])
+    return transform_points(prepared.fix_offset, np.broadcast_to(arm, (len(prepared.fix_offset), 2)))
+
+
+def _antennas(prepared: PreparedDrive, pose: Floats, point_scale: float) -> Floats:
+    """The antenna (f, 2) in the map at each fix, as keyframe poses (n, 3) place it."""
+    return transform_points(pose[prepared.fix_keyframe], _arms(prepared, point_scale))
+
+
+def _chordal(prepared: PreparedDrive, usable: Bools, *, point_scale: float) -> Floats:
+    arm = _arms(prepared, point_scale)
+    return chordal_poses(
+        prepared.motions,
+        prepared.fix_m[usable],
+        arm[usable],
+        prepared.fix_keyframe[usable],
+        sigma_m=LINEAR_SIGMA_M,
+        cauchy_m=LINEAR_CAUCHY_M,
+    )
+
+
+def _contradiction(prepared: PreparedDrive, pose: Floats, usable: Bools, point_scale: float) -> float:
+    """How much poses (n, 3) contradict odometry and usable fixes: their cost in sigmas squared, fixes under Cauchy,
+    odometry at the calibration that suits the poses best."""
+    motions = prepared.motions
+    residual = relative_poses(pose[:-1], pose[1:]) - motions.delta
+    residual[:, 2] = wrap_angles_rad(residual[:, 2])
+    information = np.linalg.inv(motions.covariance)
+    weighted = np.einsum("nki,nkl->nil", motions.derivative, information)
+    normal = np.einsum("nil,nlj->ij", weighted, motions.derivative) + np.diag(CALIBRATION_INFORMATION)
+    change = np.linalg.solve(normal, np.einsum("nil,nl->i", weighted, residual))
+    residual -= motions.derivative @ change
+    by_odometry = np.einsum("ni,nij,nj->", residual, information, residual)
+    off_m = np.hypot(*(prepared.fix_m - _antennas(prepared, pose, point_scale))[usable].T)
+    by_fixes = (LINEAR_CAUCHY_M / LINEAR_SIGMA_M) ** 2 * np.log1p((off_m / LINEAR_CAUCHY_M) ** 2).sum()
+    return float(by_odometry + by_fixes)
+
+
+def _bent(prepared: PreparedDrive, allowed: Bools, *, point_scale: float) -> tuple[Floats, Bools]:
+    """Keyframe poses (n, 3) bent to the allowed fixes (f,), and which fixes agree with one another."""
     rows = np.nonzero(allowed & prepared.fix_usable)[0]
     described, path = prepared.drive.described, prepared.motions.path
     arm = point_scale * np.array([described.antenna_x_m, described.antenna_y_m])

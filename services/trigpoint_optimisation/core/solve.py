@@ -46,6 +46,7 @@ CAMERA_CALIBRATION = (  # the states of `sighting_factor`, in their order
     "camera_bearing_rad",
     "camera_bearing_scale",
 )
+BELIEVED_SHARE = 0.7  # of a drive's fixes: a filter that rejects more has probably lost its way
 UNNUMBERED = 0  # a map version until the log gives it its number
 
 
@@ -94,13 +95,14 @@ def solve_map(
 
 
 def accepted_fixes(drive: Drive, verdicts: Sequence[FixJudged]) -> Bools:
-    """Which of a drive's fixes (f,) the filter accepted; all of them if it judged none of this drive."""
+    """Which of a drive's fixes (f,) the filter accepted; all of them where it accepted too few to be believed: then
+    it lost its way, and the solve decides by itself."""
     own = {
         verdict.fix_sequence: verdict.accepted
         for verdict in verdicts
         if (verdict.vehicle, verdict.boot_id) == (drive.vehicle, drive.boot_id)
     }
-    if not any(own.values()):
+    if sum(own.values()) < BELIEVED_SHARE * len(drive.fixes.stamp_ns):
         return np.ones(len(drive.fixes.stamp_ns), dtype=bool)
     return np.array([own.get(int(sequence), False) for sequence in drive.fixes.sequence], dtype=bool)
 
