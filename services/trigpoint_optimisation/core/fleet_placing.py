@@ -142,7 +142,8 @@ def _united(parts: list[Fleet]) -> Fleet:
 
 def _left_out(fleet: Fleet, index: int, why: str) -> LeftOut:
     drive = fleet.prepared[index].drive
-    reason = f"{why}; and fewer than {MIN_COMMON} landmarks of known identity tie it to anchors or to placed drives"
+    tie = f"fewer than {MIN_COMMON} landmarks of known identity tie it to placed drives or, method anchored, to anchors"
+    reason = f"{why}; and {tie}"
     return LeftOut(vehicle=drive.vehicle, boot_id=drive.boot_id, reason=reason)
 
 
