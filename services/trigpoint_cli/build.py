@@ -11,12 +11,7 @@ from trigpoint_cli.pipeline import Built, build_map
 from trigpoint_evaluation.core.summary import summary_of
 from trigpoint_optimisation.settings import Edges, Method
 
-METHODS, EDGES = ("rigid", "loose", "anchored"), ("paper", "best")
-
-
-def edges_of(name: str) -> Edges:
-    """The solver's name of the edges a person chose: "best" are the honest ones."""
-    return "paper" if name == "paper" else "honest"
+METHODS, EDGES = ("rigid", "loose", "anchored"), ("paper", "honest", "close")
 
 
 def map_values(solved: SolvedMap) -> JsonObject:
@@ -72,12 +67,12 @@ def built_answer(built: Built) -> Answer:
 @click.command("build")
 @data_option
 @click.option("--method", type=click.Choice(METHODS), help="Default: anchored where anchors are, else loose.")
-@click.option("--edges", type=click.Choice(EDGES), default="best", help="How fixes enter: as in the paper, or best.")
+@click.option("--edges", type=click.Choice(EDGES), help="How fixes enter. Default: paper; honest where anchors are tied.")
 @answering
-def command(data: DataDirectory, method: Method | None, edges: str, *, screen: Screen) -> Answer:
+def command(data: DataDirectory, method: Method | None, edges: Edges | None, *, screen: Screen) -> Answer:
     """Filter what was not filtered yet, solve a new map version, and bring the landmark database up to it."""
     with data.opened_log() as log:
-        built = build_map(data, log, screen, method=method, edges=edges_of(edges))
+        built = build_map(data, log, screen, method=method, edges=edges)
     if not built.projection.applied:
         refused = "; ".join(built_answer(built).complaints)
         raise InputError(f"the map was solved, and the landmark database did not take it: {refused or 'no reason'}")

@@ -2,13 +2,14 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import click
 
 from trigpoint.errors import InputError
 from trigpoint.events.mapped import TrajectorySolved
 from trigpoint.logs.readings import logged_verdicts
-from trigpoint_cli.build import EDGES, METHODS, edges_of
+from trigpoint_cli.build import EDGES, METHODS
 from trigpoint_cli.data_dir import DataDirectory, data_option
 from trigpoint_cli.kept_solves import joint_covariance_m2, kept_solve
 from trigpoint_cli.leave_out import leave_out
@@ -26,7 +27,7 @@ from trigpoint_evaluation.core.gnss import (
 )
 from trigpoint_filtering.core.track import FilteredDrive
 from trigpoint_optimisation.core.solve import Solution
-from trigpoint_optimisation.settings import Method, SolveSettings
+from trigpoint_optimisation.settings import Edges, Method, SolveSettings
 
 
 @click.group("evaluate", help="Measure a map against withheld fixes, withheld anchors or truth.")
@@ -43,9 +44,15 @@ command.add_command(leave_out)
 @click.option("--withhold-duration-s", "duration_s", type=float, required=True, metavar="D")
 @click.option("--withhold-offset-s", "offset_s", type=float, default=0.0, show_default=True, metavar="O")
 @click.option("--method", type=click.Choice(METHODS), help="Default: anchored where anchors are, else loose.")
-@click.option("--edges", type=click.Choice(EDGES), default="best", help="How fixes enter: as in the paper, or best.")
+@click.option(
+    "--edges",
+    type=click.Choice((*EDGES, "best")),
+    default="best",
+    show_default=True,
+    help="How fixes enter; best for this measure is close: the fixes themselves are the reference.",
+)
 @answering
-def gnss(data: DataDirectory, method: Method | None, edges: str, *, screen: Screen, **withhold: float) -> Answer:
+def gnss(data: DataDirectory, method: Method | None, edges: Edges | Literal["best"], *, screen: Screen, **withhold: float) -> Answer:
     """Solve without some fixes, then measure the antenna's distance to them.
 
     Of every P seconds of a drive, D seconds of fixes are withheld, the first time O seconds after its start.
@@ -53,7 +60,7 @@ def gnss(data: DataDirectory, method: Method | None, edges: str, *, screen: Scre
     withholding = Withholding(**withhold)
     with data.opened_log() as log:
         inputs = read_inputs(log, screen)
-    settings = settings_for(method, inputs.anchors, edges=edges_of(edges))
+    settings = settings_for(method, inputs.anchors, edges="close" if edges == "best" else edges)
     total, vehicles = _withheld_evaluation(inputs, withholding, settings, screen)
     values = _gnss_values(total) | {
         "method": settings.method,

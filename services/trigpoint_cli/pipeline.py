@@ -60,7 +60,7 @@ def settings_for(
     method: Method | None,
     anchors: Sequence[AnchorLabelled],
     *,
-    edges: Edges = "honest",
+    edges: Edges | None = None,
     known_association: bool = False,
 ) -> SolveSettings:
     """Settings of a method; without one `anchored` where there are anchors, else `loose`. Raises InputError."""
@@ -93,7 +93,7 @@ def solve(
 
 
 def build_map(
-    data: DataDirectory, log: EventLog, screen: Screen, *, method: Method | None, edges: Edges = "honest"
+    data: DataDirectory, log: EventLog, screen: Screen, *, method: Method | None, edges: Edges | None = None
 ) -> Built:
     """A new map version in the log and the landmark database: filtered where that was not done yet, then solved."""
     settings = settings_for(method, logged_anchors(log), edges=edges)

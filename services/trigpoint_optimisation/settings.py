@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Literal
 
 Method = Literal["rigid", "loose", "anchored"]
-Edges = Literal["paper", "honest"]
+Edges = Literal["paper", "honest", "close"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,10 +18,16 @@ class FixSettings:
     bias_sigma_m: float
     bias_time_s: float
     cauchy_scale: float  # residuals beyond this many sigmas count ever less
+    landmark_slack_m: float = 0.0  # error granted to each sighting so that landmarks give way to the fixes
 
 
 # Yi, Worrall and Nebot, section III-B: one edge every 10 m of travel, sigma 5 m east and north.
 PAPER_EDGES = FixSettings(spacing_m=10.0, sigma_m=5.0, bias_sigma_m=0.0, bias_time_s=1.0, cauchy_scale=2.0)
+# The receiver is the reference: where it will be is told best by a path that stays close to its neighbouring fixes,
+# also where it wanders off together with them; landmarks of other passes give way.
+CLOSE_EDGES = FixSettings(
+    spacing_m=2.0, sigma_m=0.5, bias_sigma_m=0.0, bias_time_s=1.0, cauchy_scale=3.0, landmark_slack_m=4.0
+)
 # Each fix says so little that a hundred wrong ones in a row do not bend the path: to decide which fixes to trust.
 SELECTION_EDGES = FixSettings(spacing_m=1.0, sigma_m=15.0, bias_sigma_m=0.0, bias_time_s=1.0, cauchy_scale=0.3)
 # The error of real receivers is correlated over tens of seconds: white part and slow part apart.
@@ -125,7 +131,7 @@ class SolveSettings:
     """One solve of the map."""
 
     method: Method = "anchored"
-    edges: Edges = "honest"
+    edges: Edges | None = None  # None: the paper's, but honest ones where anchors must not fight with the fixes
     known_association: bool = False
     image_offsets: bool = True
     calibration: CalibrationPriors = field(default_factory=CalibrationPriors)
@@ -136,7 +142,12 @@ class SolveSettings:
     @property
     def fixes(self) -> FixSettings:
         """How fixes enter the graph."""
-        return PAPER_EDGES if self.edges == "paper" else HONEST_EDGES
+        return {"paper": PAPER_EDGES, "honest": HONEST_EDGES, "close": CLOSE_EDGES}[self.chosen_edges]
+
+    @property
+    def chosen_edges(self) -> Edges:
+        """The edges named, or those that suit the method."""
+        return self.edges or ("honest" if self.method == "anchored" else "paper")
 
 
 def settings_json(settings: SolveSettings) -> str:

@@ -1,5 +1,6 @@
 """Detections become landmarks: tracks within a pass, joined over passes and vehicles, and joined anew after a solve."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -184,9 +185,15 @@ def _join_close(groups: LandmarkGroups, tracks: Tracks, settings: DetectionSetti
 
 def fleet_sightings(fleet: Fleet, association: Association) -> Sightings:
     """The averaged sightings of all drives but cameras' under the association."""
+    slack_m = fleet.settings.fixes.landmark_slack_m
     return joined(
         [
-            drive_sightings(each, _unless_camera(each, track), point_scale=fleet.frame.point_scale, noise=noise)
+            drive_sightings(
+                each,
+                _unless_camera(each, track),
+                point_scale=fleet.frame.point_scale,
+                noise=replace(noise, common_sigma_m=math.hypot(noise.common_sigma_m, slack_m)),
+            )
             for each, track, noise in zip(fleet.prepared, association.track, fleet.noise, strict=True)
         ]
     )

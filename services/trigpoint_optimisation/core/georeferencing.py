@@ -50,7 +50,7 @@ def georeferenced(fleet: Fleet, *, progress: Progress) -> tuple[Fleet, MapState]
     assert state is not None
     fleet, state = _selected(fleet, state, allowed)
     progress("odometry and fixes", (PLACINGS + 1) / (PLACINGS + 2))
-    if fleet.settings.edges == "honest":
+    if fleet.settings.chosen_edges == "honest":
         fleet, state = with_measured_fixes(fleet, state)
     state = solved_state(georeferenced_graph(fleet, robust=True), state)
     progress("odometry and fixes", 1.0)

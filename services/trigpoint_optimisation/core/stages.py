@@ -138,6 +138,7 @@ def _with_landmarks(placed: PlacedFleet, labels: Labels, progress: Progress) -> 
         if np.array_equal(renewed.landmark_of_track, solved.association.landmark_of_track):
             break
         solved = replace(_associated(fleet, state, renewed, labels), left_out=placed.left_out)
+        fleet, state = solved.fleet, solved.state
     solved = _resighted(replace(solved, fleet=fleet, state=state))
     return replace(solved, state=solved_state(full_graph(solved), solved.state))
 
