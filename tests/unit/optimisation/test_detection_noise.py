@@ -35,7 +35,8 @@ def test_range_and_bearing_noise_are_told_apart() -> None:
 
 def test_what_all_detections_of_a_keyframe_share_is_found() -> None:
     found = measured(range_m=0.05, bearing_rad=0.002, common_m=0.2)
-    assert found.common_sigma_m == pytest.approx(0.2, rel=0.15)  # 800 sightings by medians: 5 %, and its excess
+    # m: the range noise measured holds part of it too, so a tenth less than 0.2 is left for it
+    assert 0.16 < found.common_sigma_m < 0.205
 
 
 def test_nothing_shared_is_found_where_there_is_nothing() -> None:

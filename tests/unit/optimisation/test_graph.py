@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from driven_paths.examples import ANTENNA_M, FRAME, Course, driven
 from trigpoint_optimisation.core.graph import (
     TiedLabels,
+    add_fix_bias,
     add_fixes,
     add_labels,
     add_sightings,
@@ -25,6 +26,7 @@ from trigpoint_optimisation.core.sightings import Sightings
 from trigpoint_optimisation.core.state import (
     DriveState,
     MapState,
+    fix_bias_key,
     image_key,
     landmark_key,
     pose_key,
@@ -126,6 +128,35 @@ def test_knots_of_the_slow_error_cover_every_fix(prepared: PreparedDrive) -> Non
     assert np.diff(knots).tolist() == [10_000_000_000] * (len(knots) - 1)
     assert knots[0] <= WORLD.drive.fixes.stamp_ns[0]
     assert knots[-1] > WORLD.drive.fixes.stamp_ns[-1]
+
+
+def test_the_slow_error_is_as_large_at_every_knot() -> None:
+    graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
+    add_fix_bias(graph, 0, np.arange(5, dtype=np.int64) * 100_000_000_000, HONEST_EDGES)
+    for knot in range(5):
+        values.insert(fix_bias_key(0, knot), np.zeros(2))
+    last = gtsam.Marginals(graph, values).marginalCovariance(fix_bias_key(0, 4))
+    np.testing.assert_allclose(last, HONEST_EDGES.bias_sigma_m**2 * np.eye(2), rtol=1e-9)  # rounding
+
+
+def test_a_slow_error_that_grows_evenly_is_taken_evenly_between_its_knots(prepared: PreparedDrive) -> None:
+    fixes = replace(HONEST_EDGES, bias_time_s=30.0)  # a knot every 10 s
+    state, graph = truth(prepared, fixes), gtsam.NonlinearFactorGraph()
+    rows = chosen_fixes(prepared, np.ones(60, dtype=bool), spacing_m=6.0)
+    add_fixes(graph, prepared, rows, fixes=fixes, robust=False)
+    grown = np.arange(len(state.drives[0].fix_bias_m)) * np.array([[10.0], [0.0]])
+    values = values_of(replace(state, drives=(replace(state.drives[0], fix_bias_m=grown.T),)))
+    edges = [graph.at(index) for index in range(graph.size() - len(rows), graph.size())]
+    east_m = [edge.unwhitenedError(values)[0] for edge in edges if isinstance(edge, gtsam.NoiseModelFactor)]
+    after_s = (WORLD.drive.fixes.stamp_ns[rows] - WORLD.drive.fixes.stamp_ns[0]) * 1e-9
+    np.testing.assert_allclose(east_m, after_s, atol=0.05)  # m: metre a second; the drive's own truth is good to 0.03
+
+
+def test_a_lever_arm_is_held_where_it_was_described(prepared: PreparedDrive) -> None:
+    graph, state = fleet_graph([prepared], SETTINGS.calibration, point_scale=FRAME.point_scale), truth(prepared)
+    arm_m = state.drives[0].antenna_m + (SETTINGS.calibration.antenna_m, 0.0)
+    moved = replace(state, drives=(replace(state.drives[0], antenna_m=arm_m),))
+    assert graph.error(values_of(moved)) - graph.error(values_of(state)) == pytest.approx(0.5)  # one sigma
 
 
 def test_odometry_at_the_truth_costs_nothing(prepared: PreparedDrive) -> None:

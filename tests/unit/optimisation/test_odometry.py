@@ -73,14 +73,15 @@ def test_steering_scaled_wrong_leaves_the_road() -> None:
     assert straying_m(driven(course), wrong) > 20.0 * straying_m(driven(course), calibration(course))
 
 
-def test_a_speed_wheel_beside_the_middle_goes_faster_outside() -> None:
+@pytest.mark.parametrize("turns_by", ["imu", "steering"])
+def test_a_speed_wheel_beside_the_middle_goes_slower_inside(turns_by: str) -> None:
     # Wheel 1 m to the left of the base, turning left at 0.1 rad/s: the base goes faster by 0.1 m/s than the wheel.
-    world = driven(Course(turn_radps=0.1))
+    world = driven(Course(turn_radps=0.1, turns_by=turns_by))
     beside = replace(world.drive, described=replace(world.drive.described, speed_wheel_y_m=1.0))
     own = calibration()
     middle_m = dead_reckon(world.drive, own, max_gap_s=MAX_GAP_S).distance_m
-    beside_m = dead_reckon(beside, own, max_gap_s=MAX_GAP_S).distance_m
-    turned = dead_reckon(world.drive, own, max_gap_s=MAX_GAP_S).pose[:, 2]
+    path = dead_reckon(beside, own, max_gap_s=MAX_GAP_S)
+    beside_m, turned = path.distance_m, path.pose[:, 2]
     np.testing.assert_allclose(beside_m - middle_m, turned - turned[0], atol=1e-6)  # m: 1 m times rad, rounding
 
 

@@ -54,6 +54,13 @@ def test_between_true_keyframes_the_path_is_true(block: World, prepared: Prepare
     assert np.hypot(*(found - truth_at(block, prepared, stamp_ns))[:, :2].T).max() < 0.03  # m: wheel noise over 2 m
 
 
+def test_a_keyframe_moved_by_a_solve_leaves_no_jump_in_the_path(block: World, prepared: PreparedDrive) -> None:
+    pose = truth_at(block, prepared, prepared.stamp_ns)
+    pose[20:, 0] += 1.0
+    path = poses_at(prepared, pose, prepared.drive.wheels.stamp_ns)
+    assert np.hypot(*np.diff(path[:, :2], axis=0).T).max() < 0.6  # m: 0.3 m a step and the metre spread over seven
+
+
 @pytest.mark.parametrize("heading_rad", [0.0, 2.0, math.pi])
 def test_turning_all_keyframes_turns_the_path_between_them(
     block: World, prepared: PreparedDrive, heading_rad: float
@@ -94,6 +101,15 @@ def test_many_detections_are_no_surer_than_what_they_share(prepared: PreparedDri
     track = np.zeros(len(prepared.detection_keyframe), dtype=np.int64)
     covariance = drive_sightings(prepared, track, point_scale=1.0, noise=NOISE).covariance
     assert np.linalg.eigvalsh(covariance).min() >= NOISE.common_sigma_m**2
+
+
+def test_four_independent_detections_halve_the_sigma(prepared: PreparedDrive) -> None:
+    noise = replace(NOISE, bearing_sigma_rad=1e-9, common_sigma_m=0.0)
+    rows = np.nonzero(prepared.detection_keyframe == prepared.detection_keyframe[0])[0]
+    track = np.full(len(prepared.detection_keyframe), -1, dtype=np.int64)
+    track[rows] = 0
+    (covariance,) = drive_sightings(prepared, track, point_scale=1.0, noise=noise).covariance
+    assert np.trace(covariance) == pytest.approx(0.1**2 / len(rows))  # each 0.1 m along its own ray
 
 
 def test_a_sightings_covariance_lies_along_its_ray(prepared: PreparedDrive) -> None:
