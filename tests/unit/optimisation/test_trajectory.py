@@ -103,7 +103,7 @@ def test_many_detections_are_no_surer_than_what_they_share(prepared: PreparedDri
     assert np.linalg.eigvalsh(covariance).min() >= NOISE.common_sigma_m**2
 
 
-def test_four_independent_detections_halve_the_sigma(prepared: PreparedDrive) -> None:
+def test_independent_detections_average_their_noise(prepared: PreparedDrive) -> None:
     noise = replace(NOISE, bearing_sigma_rad=1e-9, common_sigma_m=0.0)
     rows = np.nonzero(prepared.detection_keyframe == prepared.detection_keyframe[0])[0]
     track = np.full(len(prepared.detection_keyframe), -1, dtype=np.int64)
