@@ -19,7 +19,7 @@ from trigpoint_optimisation.settings import OdometrySettings, SolveSettings
 
 Floats = NDArray[np.float64]
 
-SETTINGS = SolveSettings(method="loose", odometry=OdometrySettings(keyframe_m=4.0))  # coarse: half the time
+SETTINGS = SolveSettings(method="loose", edges="honest", odometry=OdometrySettings(keyframe_m=4.0))  # coarse: quick
 BOTH = (Lap(), Lap(vehicle="van", begin_rad=3.5, seed=2, duration_s=50.0))
 SHORT = Lap(duration_s=40.0)
 
@@ -196,9 +196,13 @@ def test_the_same_drives_give_the_same_bytes() -> None:
 
 
 def test_a_fix_the_filter_rejected_has_no_say() -> None:
-    small = world(SHORT)
-    verdicts = [judged(sequence, accepted=sequence % 3 != 0) for sequence in range(40)]
-    assert accepted_fixes(small.drives[0], verdicts).tolist() == [sequence % 3 != 0 for sequence in range(40)]
+    verdicts = [judged(sequence, accepted=sequence % 10 != 0) for sequence in range(40)]
+    assert accepted_fixes(world(SHORT).drives[0], verdicts).tolist() == [sequence % 10 != 0 for sequence in range(40)]
+
+
+def test_a_filter_that_rejects_nearly_everything_lost_its_way() -> None:
+    verdicts = [judged(sequence, accepted=sequence % 10 == 0) for sequence in range(40)]
+    assert accepted_fixes(world(SHORT).drives[0], verdicts).all()
 
 
 def test_another_drives_verdicts_do_not_count() -> None:
