@@ -1,5 +1,7 @@
 """Keyframe poses from odometry and fixes by one linear solve, without any first guess of heading or position."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
@@ -38,7 +40,7 @@ def chordal_poses(
     return np.column_stack([position.real, position.imag, np.angle(rotation)])
 
 
-def _add(band: Complexes, row: Ints, column: Ints, value: Complexes) -> None:
+def _add(band: Complexes, row: Ints, column: Ints, value: NDArray[np.complexfloating[Any, Any]]) -> None:
     """Adds to entries on or above the diagonal, in the upper form of solveh_banded."""
     np.add.at(band, (BAND - 1 + row - column, column), value)
 
