@@ -67,7 +67,7 @@ def built_answer(built: Built) -> Answer:
 @click.command("build")
 @data_option
 @click.option("--method", type=click.Choice(METHODS), help="Default: anchored where anchors are, else loose.")
-@click.option("--edges", type=click.Choice(EDGES), help="How fixes enter. Default: paper; honest where anchors are tied.")
+@click.option("--edges", type=click.Choice(EDGES), help="Default: paper; honest where anchors are tied.")
 @answering
 def command(data: DataDirectory, method: Method | None, edges: Edges | None, *, screen: Screen) -> Answer:
     """Filter what was not filtered yet, solve a new map version, and bring the landmark database up to it."""

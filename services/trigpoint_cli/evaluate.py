@@ -52,7 +52,9 @@ command.add_command(leave_out)
     help="How fixes enter; best for this measure is close: the fixes themselves are the reference.",
 )
 @answering
-def gnss(data: DataDirectory, method: Method | None, edges: Edges | Literal["best"], *, screen: Screen, **withhold: float) -> Answer:
+def gnss(
+    data: DataDirectory, method: Method | None, edges: Edges | Literal["best"], *, screen: Screen, **withhold: float
+) -> Answer:
     """Solve without some fixes, then measure the antenna's distance to them.
 
     Of every P seconds of a drive, D seconds of fixes are withheld, the first time O seconds after its start.

@@ -26,7 +26,7 @@ Bools = NDArray[np.bool_]
 
 PLACINGS = 2  # the second one with the calibration the first one led to
 TRUST_M = 12.0  # a fix further than this from the robust path is not trusted: five sigmas of a usual slow error
-LONG_OUTAGE_S = 60.0  # before and after an outage longer than this,
+LONG_OUTAGE_S = 150.0  # before and after an outage longer than this,
 BEFORE_OUTAGE_S = 30.0  # a receiver that lost its satellites extrapolates for so long,
 AFTER_OUTAGE_S = 5.0  # and needs so long to settle again
 
