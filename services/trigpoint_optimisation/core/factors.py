@@ -46,13 +46,8 @@ def odometry_factor(
         east, north = end.x() - start.x(), end.y() - start.y()
         ahead, left = c * east + s * north, c * north - s * east
         turned = end.theta() - heading
-        residual = np.array(
-            [
-                (ahead - expected[0]) / speed,
-                (left - expected[1]) / speed,
-                wrap_angle_rad(turned - expected[2]) / turn,
-            ]
-        )
+        off_rad = wrap_angle_rad(turned - expected[2])
+        residual = np.array(((ahead - expected[0]) / speed, (left - expected[1]) / speed, off_rad / turn))
         if jacobians is not None:
             ct, st = math.cos(turned) / speed, math.sin(turned) / speed
             u, w = 1.0 / speed, 1.0 / turn
@@ -173,16 +168,11 @@ def sighting_factor(
         square_m2 = max(x * x + y * y, MIN_DISTANCE_M**2)
         if jacobians is not None:
             gx, gy = x / square_m2, y / square_m2
-            for_range, for_bearing = (gx * cs - gy * ss, gx * ss + gy * cs), (-gy * cs - gx * ss, gx * cs - gy * ss)
-            rows = for_range, for_bearing
+            rows = (gx * cs - gy * ss, gx * ss + gy * cs), (-gy * cs - gx * ss, gx * cs - gy * ss)
             jacobians[0] = np.array([(-p, -q, p * left - q * ahead) for p, q in rows])
             jacobians[1] = np.array([(1.0, bearing, square, -gx, 0.0, 0.0), (0.0, 0.0, 0.0, gy, 1.0, bearing)])
             in_map = [(p * c - q * s, p * s + q * c) for p, q in rows]
-            if target is not None:
-                own = [(p * seen_c + q * seen_s, q * seen_c - p * seen_s) for p, q in in_map]
-                jacobians[2] = np.array([(p, q, q * target[0] - p * target[1]) for p, q in own])
-            else:
-                jacobians[2] = np.array(in_map)
+            jacobians[2] = _by_seen(in_map, target, seen_c, seen_s)
         expected = 0.5 * math.log(square_m2) + k0 + k1 * bearing + k2 * square
         off = wrap_angle_rad(math.atan2(y, x) + k4 + (k5 - 1.0) * bearing)
         return np.array((expected - measured.ln_range, off))
@@ -198,3 +188,11 @@ def _seen(values: gtsam.Values, key: int, target: list[float] | None) -> tuple[f
     pose = values.atPose2(key)
     c, s = math.cos(pose.theta()), math.sin(pose.theta())
     return pose.x() + c * target[0] - s * target[1], pose.y() + s * target[0] + c * target[1], c, s
+
+
+def _by_seen(in_map: list[tuple[float, float]], target: list[float] | None, c: float, s: float) -> Floats:
+    """Derivatives by what was seen, from those by its place in the map: a landmark, or a pose with cosine and sine."""
+    if target is None:
+        return np.array(in_map)
+    own = [(p * c + q * s, q * c - p * s) for p, q in in_map]
+    return np.array([(p, q, q * target[0] - p * target[1]) for p, q in own])
