@@ -1,7 +1,7 @@
 """What can be chosen about a solve; every number has a unit in its name and a source beside it."""
 
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Literal
 
 Method = Literal["rigid", "loose", "anchored"]
@@ -30,6 +30,8 @@ CLOSE_EDGES = FixSettings(
 )
 # Each fix says so little that a hundred wrong ones in a row do not bend the path: to decide which fixes to trust.
 SELECTION_EDGES = FixSettings(spacing_m=1.0, sigma_m=15.0, bias_sigma_m=0.0, bias_time_s=1.0, cauchy_scale=0.3)
+# Beside odometry that is unsure within metres, a slow error of its own keeps a wandering receiver from bending it.
+SAMPLED_SELECTION_EDGES = replace(SELECTION_EDGES, bias_sigma_m=3.0, bias_time_s=60.0)
 # The error of real receivers is correlated over tens of seconds: white part and slow part apart.
 HONEST_EDGES = FixSettings(spacing_m=2.0, sigma_m=1.5, bias_sigma_m=2.5, bias_time_s=300.0, cauchy_scale=2.0)
 
@@ -45,13 +47,17 @@ class CalibrationPriors:
     turn_bias_imu_radps: float = 0.01
     turn_bias_steering_rad: float = 0.03
     turn_bias_wheels_radpm: float = 0.02
-    turn_bias_walk_fraction: float = 0.05  # of the bias sigma, per sqrt(minute)
+    turn_bias_walk_fraction: float = 0.10  # of the bias sigma, per sqrt(minute): tyres, load, camber
+    turn_bias_walk_fraction_imu: float = 0.05  # a gyroscope's bias is steadier
     turn_bias_knot_s: float = 60.0
     delay_s: float = 0.05
     antenna_m: float = 0.30
     speed_scale_command: float = 0.05  # commanded speeds are not measured ones
     turn_scale_command: float = 0.10
     turn_bias_command_radpm: float = 0.002
+    speed_scale_sampled: float = 0.10  # momentary speeds, at the low end of a tyre whose pressure nobody checked
+    turn_bias_sampled_radpm: float = 0.03  # 1.7 % between the radii of wheels 0.57 m apart
+    delay_sampled_s: float = 0.30  # a sample a second says when to within its period / sqrt(12)
     delay_camera_s: float = 0.30  # images are worked on before they are stamped
     camera_range: float = 0.02  # ln range, averaged over the drive's own bearings
     camera_range_per_rad: float = 0.05
@@ -66,7 +72,8 @@ class OdometrySettings:
     """Random part of odometry (see OdometryNoise) and where keyframes stand."""
 
     along_m: float = 0.03
-    across_m: float = 0.01
+    across_m: float = 0.02
+    across_imu_m: float = 0.01
     heading_rad: float = 0.004
     heading_imu_rad: float = 0.0001
     heading_rad_per_sqrt_s: float = 0.0003
@@ -83,6 +90,7 @@ class OdometrySettings:
     command_rad_per_sqrt_s: float = 0.015
     command_fraction: float = 0.1  # of distance and of turn, per keyframe
     command_across_fraction: float = 0.02
+    sampled_across_m: float = 0.035  # wheels slip sideways by 3 % of a metre
     max_gap_s: float = 2.0
 
 
@@ -132,7 +140,6 @@ class SolveSettings:
 
     method: Method = "anchored"
     edges: Edges | None = None  # None: the paper's, but honest ones where anchors must not fight with the fixes
-    known_association: bool = False
     image_offsets: bool = True
     calibration: CalibrationPriors = field(default_factory=CalibrationPriors)
     odometry: OdometrySettings = field(default_factory=OdometrySettings)

@@ -17,13 +17,14 @@ BAND = 4  # a keyframe's position and rotation meet the next one's: four neighbo
 
 
 def chordal_poses(
-    motions: Motions, fix_m: Floats, arm_m: Floats, keyframe: Ints, *, sigma_m: float, cauchy_m: float
+    motions: Motions, fix_m: Floats, arm_m: Floats, keyframe: Ints, *, sigma_m: float, cauchy_m: float | None
 ) -> Floats:
     """Keyframe poses (n, 3) in the map: x, y in m, heading in rad.
 
     fix_m (f, 2) in the map, arm_m (f, 2) the antenna in its keyframe's frame, keyframe (f,). Position and rotation of
     each keyframe are complex unknowns, the rotation's length left free: then odometry and fixes are linear in them
-    (chordal relaxation; Carlone et al. 2015), first plain, then with Cauchy weights of scale `cauchy_m`.
+    (chordal relaxation; Carlone et al. 2015), first plain, then, unless it is None, with Cauchy weights of scale
+    `cauchy_m`.
     """
     weight = np.ones(len(fix_m))
     solution = np.zeros(2 * len(motions.stamp_ns), dtype=np.complex128)
@@ -33,6 +34,8 @@ def chordal_poses(
         band, right = base.copy(), np.zeros(len(solution), dtype=np.complex128)
         _add_fixes(band, right, fix, arm, keyframe, weight / sigma_m**2)
         solution = solveh_banded(band, right, overwrite_ab=True, overwrite_b=True)
+        if cauchy_m is None:
+            break
         rotation = solution[1::2][keyframe]
         turned = arm * rotation / np.maximum(np.abs(rotation), 1e-12)
         weight = 1.0 / (1.0 + (np.abs(fix - solution[0::2][keyframe] - turned) / cauchy_m) ** 2)

@@ -23,14 +23,22 @@ ErrorFunction = Callable[[gtsam.CustomFactor, gtsam.Values, Jacobians], Floats]
 
 
 def odometry_factor(
-    keys: tuple[int, int, int, int], delta: Floats, derivative: Floats, *, reference: Floats, covariance: Floats
+    keys: tuple[int, int, int, int],
+    delta: Floats,
+    derivative: Floats,
+    *,
+    reference: Floats,
+    covariance: Floats,
+    by_scale_units: bool = True,
 ) -> gtsam.CustomFactor:
     """Motion from keyframe keys[0] to keys[1] as the wheels tell it under keys[2] (3,): speed scale, turn scale,
     delay, and turn bias keys[3] (1,).
 
     delta (3,) was integrated at the calibration `reference` (4,); derivative (3, 4) is its derivative there
     (Forster et al. 2017, first-order bias correction, in SE(2)). The residual is divided by the scales: taken in
-    map units, many noisy odometry residuals would shrink the map through the scale states.
+    map units, many noisy odometry residuals would shrink the map through the scale states. Where fixes outweigh the
+    odometry, which is what errors of a radian a minute mean, the division would instead stretch the scales:
+    `by_scale_units` off leaves it away.
     """
     key_from, key_to, key_scale, key_bias = keys
     by_scale, by_bias = -derivative[:, :3], -derivative[:, 3:]
@@ -47,16 +55,17 @@ def odometry_factor(
         ahead, left = c * east + s * north, c * north - s * east
         turned = end.theta() - heading
         off_rad = wrap_angle_rad(turned - expected[2])
-        residual = np.array(((ahead - expected[0]) / speed, (left - expected[1]) / speed, off_rad / turn))
+        u, w = (1.0 / speed, 1.0 / turn) if by_scale_units else (1.0, 1.0)
+        residual = np.array(((ahead - expected[0]) * u, (left - expected[1]) * u, off_rad * w))
         if jacobians is not None:
-            ct, st = math.cos(turned) / speed, math.sin(turned) / speed
-            u, w = 1.0 / speed, 1.0 / turn
+            ct, st = math.cos(turned) * u, math.sin(turned) * u
             unit = np.array([[u], [u], [w]])
             jacobians[0] = np.array([[-u, 0.0, left * u], [0.0, -u, -ahead * u], [0.0, 0.0, -w]])
             jacobians[1] = np.array([[ct, -st, 0.0], [st, ct, 0.0], [0.0, 0.0, w]])
             jacobians[2] = unit * by_scale
-            jacobians[2][:2, 0] -= residual[:2] * u
-            jacobians[2][2, 1] -= residual[2] * w
+            if by_scale_units:
+                jacobians[2][:2, 0] -= residual[:2] * u
+                jacobians[2][2, 1] -= residual[2] * w
             jacobians[3] = unit * by_bias
         return residual
 

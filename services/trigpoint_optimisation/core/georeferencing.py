@@ -17,9 +17,11 @@ from trigpoint_optimisation.core.fleet import (
     with_measured_fixes,
     with_poses,
 )
+from trigpoint_optimisation.core.graph import fix_bias_stamps
+from trigpoint_optimisation.core.odometry import TurnSource
 from trigpoint_optimisation.core.placing import placed_by_fixes
 from trigpoint_optimisation.core.state import MapState
-from trigpoint_optimisation.settings import SELECTION_EDGES
+from trigpoint_optimisation.settings import SAMPLED_SELECTION_EDGES, SELECTION_EDGES
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -59,8 +61,18 @@ def georeferenced(fleet: Fleet, *, progress: Progress) -> tuple[Fleet, MapState]
 
 def _weakly_solved(fleet: Fleet, state: MapState, *, robust: bool) -> MapState:
     """The state of a solve in which a fix says little."""
-    weak = replace(fleet, fixes=(SELECTION_EDGES,) * len(fleet.prepared))
-    bare = replace(state, drives=tuple(replace(drive, fix_bias_m=np.zeros((0, 2))) for drive in state.drives))
+    edges = tuple(
+        SAMPLED_SELECTION_EDGES if each.source is TurnSource.SAMPLED_WHEELS else SELECTION_EDGES
+        for each in fleet.prepared
+    )
+    weak = replace(fleet, fixes=edges)
+    bare = replace(
+        state,
+        drives=tuple(
+            replace(drive, fix_bias_m=np.zeros((len(fix_bias_stamps(each, own)), 2)))
+            for drive, each, own in zip(state.drives, fleet.prepared, edges, strict=True)
+        ),
+    )
     found = solved_state(georeferenced_graph(weak, robust=robust), bare)
     drives = tuple(
         replace(drive, fix_bias_m=np.zeros_like(old.fix_bias_m))

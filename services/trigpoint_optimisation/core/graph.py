@@ -75,20 +75,21 @@ def add_motions(graph: gtsam.NonlinearFactorGraph, prepared: PreparedDrive) -> N
                 motions.derivative[k],
                 reference=_calibration_vector(prepared.calibration, knot),
                 covariance=motions.covariance[k],
+                by_scale_units=prepared.source is not TurnSource.SAMPLED_WHEELS,
             )
         )
 
 
 def scale_sigmas(prepared: PreparedDrive, priors: CalibrationPriors) -> Floats:
     """1-sigma (3,) of speed scale, turn scale and delay in s by what the drive's odometry and sensor are."""
-    commanded = prepared.source is TurnSource.COMMAND
-    return np.array(
-        [
-            priors.speed_scale_command if commanded else priors.speed_scale,
-            turn_sigmas(prepared.source, priors)[0],
-            priors.delay_camera_s if prepared.camera else priors.delay_s,
-        ]
-    )
+    speed = {
+        TurnSource.COMMAND: priors.speed_scale_command,
+        TurnSource.SAMPLED_WHEELS: priors.speed_scale_sampled,
+    }.get(prepared.source, priors.speed_scale)
+    delay = priors.delay_camera_s if prepared.camera else priors.delay_s
+    if prepared.source is TurnSource.SAMPLED_WHEELS:
+        delay = priors.delay_sampled_s
+    return np.array([speed, turn_sigmas(prepared.source, priors)[0], delay])
 
 
 def sensor_sigmas(prepared: PreparedDrive, priors: CalibrationPriors) -> Floats:
@@ -116,6 +117,8 @@ def turn_sigmas(source: TurnSource, priors: CalibrationPriors) -> tuple[float, f
             return priors.turn_scale_steering, priors.turn_bias_steering_rad
         case TurnSource.COMMAND:
             return priors.turn_scale_command, priors.turn_bias_command_radpm
+        case TurnSource.SAMPLED_WHEELS:
+            return priors.turn_scale_wheels, priors.turn_bias_sampled_radpm
         case _:
             return priors.turn_scale_wheels, priors.turn_bias_wheels_radpm
 
@@ -133,7 +136,9 @@ def add_calibration_priors(
     graph.add(gtsam.PriorFactorVector(antenna_key(d), arm, diagonal(np.full(2, priors.antenna_m))))
     graph.add(gtsam.PriorFactorVector(sensor_key(d), np.zeros(6), diagonal(sensor_sigmas(prepared, priors))))
     graph.add(gtsam.PriorFactorVector(turn_bias_key(d, 0), np.zeros(1), diagonal(np.array([turn_bias]))))
-    walk = turn_bias * priors.turn_bias_walk_fraction * math.sqrt(priors.turn_bias_knot_s / 60.0)
+    by_imu = prepared.source is TurnSource.IMU
+    fraction = priors.turn_bias_walk_fraction_imu if by_imu else priors.turn_bias_walk_fraction
+    walk = turn_bias * fraction * math.sqrt(priors.turn_bias_knot_s / 60.0)
     for knot in range(1, len(prepared.calibration.turn_bias)):
         keys = turn_bias_key(d, knot - 1), turn_bias_key(d, knot)
         graph.add(decay_factor(*keys, decay=1.0, sigma_m=walk, size=1))

@@ -8,6 +8,13 @@ from numpy.typing import NDArray
 
 from trigpoint.events.drives import Drive
 from trigpoint.geodesy.poses import wrap_angles_rad
+from trigpoint_optimisation.core.sampled_wheels import (
+    coarsely_sampled,
+    sampled_speed_variance,
+    sampled_turn_variance,
+    without_wobble,
+    wobble_radps,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -25,6 +32,7 @@ class TurnSource(Enum):
     IMU = "imu"
     STEERING = "steering"
     WHEELS = "wheels"
+    SAMPLED_WHEELS = "sampled wheels"
     COMMAND = "command"
     NONE = "none"
 
@@ -90,7 +98,9 @@ def turn_source(drive: Drive) -> TurnSource:
         return TurnSource.STEERING
     if not np.isfinite(drive.wheels.yaw_rate_radps).any():
         return TurnSource.NONE
-    return TurnSource.WHEELS if drive.described.track_m > 0.0 else TurnSource.COMMAND
+    if drive.described.track_m <= 0.0:
+        return TurnSource.COMMAND
+    return TurnSource.SAMPLED_WHEELS if coarsely_sampled(drive.wheels.stamp_ns) else TurnSource.WHEELS
 
 
 def _held(values: Floats) -> Floats:
@@ -130,10 +140,22 @@ def _turn_and_speed(drive: Drive, calibration: OdometryCalibration, dt_s: Floats
             turn = calibration.turn_scale * _imu_turn_rad(drive) + bias * dt_s
         case TurnSource.WHEELS | TurnSource.COMMAND:
             turn = (calibration.turn_scale * _mean_of_ends(_held(wheels.yaw_rate_radps)) + bias * speed) * dt_s
+        case TurnSource.SAMPLED_WHEELS:
+            turn = _mean_of_ends(_sampled_yaw_rate(drive, calibration)) * dt_s
         case TurnSource.NONE:
             turn = bias * speed * dt_s
     yaw_rate = np.divide(turn, dt_s, out=np.zeros_like(turn), where=dt_s > 0.0)
     return turn, speed + described.speed_wheel_y_m * yaw_rate
+
+
+def _sampled_yaw_rate(drive: Drive, calibration: OdometryCalibration) -> Floats:
+    """Yaw rate (n,) in rad/s at each sample of coarsely sampled wheels, their wobble taken out."""
+    wheels = drive.wheels
+    index = np.searchsorted(calibration.bias_stamp_ns, wheels.stamp_ns, side="right") - 1
+    bias = calibration.turn_bias[np.maximum(index, 0)]
+    measured = _held(wheels.yaw_rate_radps)
+    rate = calibration.turn_scale * measured + bias * calibration.speed_scale * wheels.speed_mps
+    return without_wobble(rate, wobble_radps(measured, wheels.speed_mps))
 
 
 def dead_reckon(drive: Drive, calibration: OdometryCalibration, *, max_gap_s: float) -> DeadReckonedPath:
@@ -147,6 +169,7 @@ def dead_reckon(drive: Drive, calibration: OdometryCalibration, *, max_gap_s: fl
     heading = np.concatenate([[0.0], np.cumsum(turn_rad)])
     middle = heading[:-1] + 0.5 * turn_rad
     step_m = speed_mps * dt_s
+    coarse = turn_source(drive) is TurnSource.SAMPLED_WHEELS
     x = np.concatenate([[0.0], np.cumsum(step_m * np.cos(middle))])
     y = np.concatenate([[0.0], np.cumsum(step_m * np.sin(middle))])
     return DeadReckonedPath(
@@ -154,8 +177,8 @@ def dead_reckon(drive: Drive, calibration: OdometryCalibration, *, max_gap_s: fl
         pose=np.column_stack([x, y, heading]),
         distance_m=np.concatenate([[0.0], np.cumsum(np.abs(step_m))]),
         turned_rad=np.concatenate([[0.0], np.cumsum(np.abs(turn_rad))]),
-        sampling_m2=_sampling_variance(step_m, dt_s),
-        sampling_rad2=_sampling_variance(turn_rad, dt_s),
+        sampling_m2=sampled_speed_variance(step_m, dt_s) if coarse else _sampling_variance(step_m, dt_s),
+        sampling_rad2=sampled_turn_variance(step_m, turn_rad, dt_s) if coarse else _sampling_variance(turn_rad, dt_s),
     )
 
 

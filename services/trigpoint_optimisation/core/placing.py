@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from trigpoint.geodesy.poses import transform_points, wrap_angles_rad
 from trigpoint_optimisation.core.alignment import bent_alignment, turned_path
 from trigpoint_optimisation.core.chordal import chordal_poses
-from trigpoint_optimisation.core.odometry import relative_poses
+from trigpoint_optimisation.core.odometry import TurnSource, relative_poses
 from trigpoint_optimisation.core.preparation import PreparedDrive
 
 Floats = NDArray[np.float64]
@@ -27,11 +27,16 @@ def placed_by_fixes(
     Two ways that need no first guess, and the one the odometry and the fixes contradict less: the path bent to its
     fixes, good where odometry is sure over tens of metres; and the linear chordal solve, good where it is not.
     `solved` (n, 3), if given, are poses of an earlier solve that stand beside the two.
+    Where the wheels were only sampled the plain linear solve alone, and every fix agrees: a long excursion of the
+    receiver looks like odometry's error until the calibration is known, and whoever is left out then stays out.
     Raises AlignmentRefused when the fixes do not determine the path.
     """
     pose, consistent = _bent(prepared, allowed, point_scale=point_scale)
     usable = allowed & prepared.fix_usable
-    linear = _chordal(prepared, usable, point_scale=point_scale)
+    if prepared.source is TurnSource.SAMPLED_WHEELS:
+        plain = _chordal(prepared, usable, point_scale=point_scale, cauchy_m=None)
+        return plain if solved is None else solved, usable
+    linear = _chordal(prepared, usable, point_scale=point_scale, cauchy_m=LINEAR_CAUCHY_M)
     others = [linear] if solved is None else [linear, solved]
     best = min(others, key=lambda other: _contradiction(prepared, other, usable, point_scale))
     if _contradiction(prepared, best, usable, point_scale) < _contradiction(prepared, pose, usable, point_scale):
@@ -52,7 +57,7 @@ def _antennas(prepared: PreparedDrive, pose: Floats, point_scale: float) -> Floa
     return transform_points(pose[prepared.fix_keyframe], _arms(prepared, point_scale))
 
 
-def _chordal(prepared: PreparedDrive, usable: Bools, *, point_scale: float) -> Floats:
+def _chordal(prepared: PreparedDrive, usable: Bools, *, point_scale: float, cauchy_m: float | None) -> Floats:
     arm = _arms(prepared, point_scale)
     return chordal_poses(
         prepared.motions,
@@ -60,7 +65,7 @@ def _chordal(prepared: PreparedDrive, usable: Bools, *, point_scale: float) -> F
         arm[usable],
         prepared.fix_keyframe[usable],
         sigma_m=LINEAR_SIGMA_M,
-        cauchy_m=LINEAR_CAUCHY_M,
+        cauchy_m=cauchy_m,
     )
 
 

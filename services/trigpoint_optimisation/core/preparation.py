@@ -77,14 +77,29 @@ def odometry_noise(source: TurnSource, settings: OdometrySettings) -> OdometryNo
     by_imu = source is TurnSource.IMU
     if source is TurnSource.COMMAND:
         return _command_noise(settings)
+    if source is TurnSource.SAMPLED_WHEELS:
+        return _sampled_noise(settings)
     return OdometryNoise(
         along_m=settings.along_m,
-        across_m=settings.across_m,
+        across_m=settings.across_imu_m if by_imu else settings.across_m,
         heading_rad=settings.heading_imu_rad if by_imu else settings.heading_rad,
         heading_rad_per_sqrt_s=settings.heading_rad_per_sqrt_s,
         turn_fraction=settings.turn_fraction_imu if by_imu else settings.turn_fraction,
         floor_m=settings.floor_m,
         floor_rad=settings.floor_imu_rad if by_imu else settings.floor_rad,
+    )
+
+
+def _sampled_noise(settings: OdometrySettings) -> OdometryNoise:
+    """What comes on top of the sampling of wheels whose momentary speeds are all that is known."""
+    return OdometryNoise(
+        along_m=0.0,
+        across_m=settings.sampled_across_m,
+        heading_rad=0.0,
+        heading_rad_per_sqrt_s=0.0,
+        turn_fraction=0.0,
+        floor_m=settings.floor_m,
+        floor_rad=settings.floor_rad,
     )
 
 
