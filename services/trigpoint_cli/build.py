@@ -68,11 +68,14 @@ def built_answer(built: Built) -> Answer:
 @data_option
 @click.option("--method", type=click.Choice(METHODS), help="Default: anchored where anchors are, else loose.")
 @click.option("--edges", type=click.Choice(EDGES), help="Default: paper; honest where anchors are tied.")
+@click.option("--image-offsets/--no-image-offsets", default=True, help="Each aerial image has an offset of its own.")
 @answering
-def command(data: DataDirectory, method: Method | None, edges: Edges | None, *, screen: Screen) -> Answer:
+def command(
+    data: DataDirectory, method: Method | None, edges: Edges | None, image_offsets: bool, *, screen: Screen
+) -> Answer:
     """Filter what was not filtered yet, solve a new map version, and bring the landmark database up to it."""
     with data.opened_log() as log:
-        built = build_map(data, log, screen, method=method, edges=edges)
+        built = build_map(data, log, screen, method=method, edges=edges, image_offsets=image_offsets)
     if not built.projection.applied:
         refused = "; ".join(built_answer(built).complaints)
         raise InputError(f"the map was solved, and the landmark database did not take it: {refused or 'no reason'}")

@@ -37,13 +37,14 @@ class _Driven:
 @click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, metavar="DIR", help="Its data directory.")
 @click.option("--seed", type=int, default=1, show_default=True, metavar="N", help="Which campus.")
 @click.option("--vehicles", type=int, default=2, show_default=True, metavar="N", help="How many drive there.")
+@click.option("--known-signatures", is_flag=True, help="Detections and labels say which landmark they are of.")
 @answering
-def command(out: Path, seed: int, vehicles: int, *, screen: Screen) -> Answer:
+def command(out: Path, seed: int, vehicles: int, known_signatures: bool, *, screen: Screen) -> Answer:
     """Simulate a campus and take it all the way to a map, a report and its errors.
 
     The vehicles' messages travel over Zenoh. DIR is a data directory afterwards: every other command works on it.
     """
-    settings = SimulationSettings(seed=seed, vehicles=vehicles)
+    settings = SimulationSettings(seed=seed, vehicles=vehicles, known_signatures=known_signatures)
     data = _emptied(out)
     screen.note(f"simulating campus {seed} with {vehicles} vehicles")
     logs = _simulated(settings, data)

@@ -41,7 +41,6 @@ class _Measured:
 @click.option("--seed", type=int, default=0, show_default=True, metavar="S")
 @click.option("--image", metavar="ID", help="Tie and measure the labels of this image only, or of `most-labelled`.")
 @click.option("--blocked", is_flag=True, help="Hold out labels that lie together, not at random.")
-@click.option("--known-association", is_flag=True, help="Let signatures say which landmark a label is.")
 @click.option("--re-solve", is_flag=True, help="Solve every draw in full too, and say how far the two differ.")
 @answering
 def leave_out(
@@ -49,14 +48,14 @@ def leave_out(
 ) -> Answer:
     """Tie N anchors, measure the others: label minus landmark minus image offset, over K draws.
 
-    Of the newest map version if it is anchored; else, or with --known-association, of one solved for this alone.
+    Of the newest map version if it is anchored; else of one solved for this alone.
     Anchors that found no landmark count as tied first: there is nothing to measure them against.
     """
     settings = LeaveOutDraws(draws=chosen["draws"], seed=chosen["seed"], blocked=bool(chosen["blocked"]))
     if chosen["re_solve"] and (tied is None or image is not None):
         raise InputError("--re-solve goes with --tied and without --image: a whole curve would take hours")
     with data.opened_log() as log:
-        measured = _measured(data, log, screen, anew=bool(chosen["re_solve"]), known=bool(chosen["known_association"]))
+        measured = _measured(data, log, screen, anew=bool(chosen["re_solve"]))
     if not measured.reduction.labels:
         raise InputError(f"none of {measured.anchor_count} anchors is tied to a landmark: nothing can be left out")
     if tied is None:
@@ -79,14 +78,14 @@ def _curve_answer(measured: _Measured, settings: LeaveOutDraws, image: str | Non
     return Answer(values | {"curve": curve}, tuple(map(_line, results)))
 
 
-def _measured(data: DataDirectory, log: EventLog, screen: Screen, *, anew: bool, known: bool) -> _Measured:
+def _measured(data: DataDirectory, log: EventLog, screen: Screen, *, anew: bool) -> _Measured:
     """The newest map version's reduction as its build kept it; else that of a solve now, from all the log holds."""
     maps, anchors = logged_maps(log), logged_anchors(log)
-    if maps and maps[-1].head.method == "anchored" and not known and not anew:
+    if maps and maps[-1].head.method == "anchored" and not anew:
         kept = kept_solve(data, maps[-1].head.map_version)
         if kept is not None:
             return _Measured(reduction=kept.reduction, anchor_count=len(maps[-1].anchors), solution=None)
-    settings = settings_for("anchored", anchors, known_association=known)
+    settings = settings_for("anchored", anchors)
     solution = solve(read_inputs(log, screen), settings, screen, verdicts=logged_verdicts(log))
     return _Measured(reduction=solution.reduction(), anchor_count=len(anchors), solution=solution)
 

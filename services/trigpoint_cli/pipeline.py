@@ -61,13 +61,13 @@ def settings_for(
     anchors: Sequence[AnchorLabelled],
     *,
     edges: Edges | None = None,
-    known_association: bool = False,
+    image_offsets: bool = True,
 ) -> SolveSettings:
     """Settings of a method; without one `anchored` where there are anchors, else `loose`. Raises InputError."""
     if method == "anchored" and not anchors:
         raise InputError("method anchored: the log holds no anchor; `trigpoint anchors import` takes them in")
     chosen: Method = method if method is not None else ("anchored" if anchors else "loose")
-    return SolveSettings(method=chosen, edges=edges, known_association=known_association)
+    return SolveSettings(method=chosen, edges=edges, image_offsets=image_offsets)
 
 
 def filter_drives(drives: Sequence[Drive], frame: MapFrame, screen: Screen) -> tuple[FilteredDrive, ...]:
@@ -93,10 +93,16 @@ def solve(
 
 
 def build_map(
-    data: DataDirectory, log: EventLog, screen: Screen, *, method: Method | None, edges: Edges | None = None
+    data: DataDirectory,
+    log: EventLog,
+    screen: Screen,
+    *,
+    method: Method | None,
+    edges: Edges | None = None,
+    image_offsets: bool = True,
 ) -> Built:
     """A new map version in the log and the landmark database: filtered where that was not done yet, then solved."""
-    settings = settings_for(method, logged_anchors(log), edges=edges)
+    settings = settings_for(method, logged_anchors(log), edges=edges, image_offsets=image_offsets)
     with screen.part_of("filtering") as filtering:
         filter_log(log, FilterSettings(), progress=filtering)
     with screen.stages("solving") as solving:

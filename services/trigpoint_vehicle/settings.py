@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from trigpoint.errors import InputError
-from trigpoint_vehicle.core.campus_settings import CampusSettings
+from trigpoint_vehicle.core.campus_settings import CampusSettings, with_known_signatures
 
 VEHICLES_MAX = 50  # every one is driven and kept in memory at once: about 100 MB each
 
@@ -14,6 +14,7 @@ class SimulationSettings:
 
     seed: int = 1
     vehicles: int = 2
+    known_signatures: bool = False
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -23,4 +24,5 @@ class SimulationSettings:
 
     def campus(self) -> CampusSettings:
         """The campus's settings."""
-        return CampusSettings(vehicles=self.vehicles)
+        settings = CampusSettings(vehicles=self.vehicles)
+        return with_known_signatures(settings) if self.known_signatures else settings

@@ -43,6 +43,11 @@ class Figure:
     measure: Callable[[Workbench], Measurement]
 
 
+def at_least(limit: float) -> Bounds:
+    """A target from below."""
+    return Bounds(at_least=limit)
+
+
 def at_most(limit: float) -> Bounds:
     """A target from above."""
     return Bounds(at_most=limit)
