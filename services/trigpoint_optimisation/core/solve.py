@@ -18,7 +18,7 @@ from trigpoint_optimisation.core.anchoring import residuals_m
 from trigpoint_optimisation.core.fleet import Progress
 from trigpoint_optimisation.core.fleet_placing import LeftOut
 from trigpoint_optimisation.core.marginals import covariance_of, pose_covariances
-from trigpoint_optimisation.core.odometry import TurnSource
+from trigpoint_optimisation.core.odometry import TurnSource, turn_source
 from trigpoint_optimisation.core.preparation import PreparedDrive
 from trigpoint_optimisation.core.stages import (
     Solved,
@@ -97,6 +97,8 @@ def solve_map(
 def accepted_fixes(drive: Drive, verdicts: Sequence[FixJudged]) -> Bools:
     """Which of a drive's fixes (f,) the filter accepted; all of them where it accepted too few to be believed: then
     it lost its way, and the solve decides by itself."""
+    if turn_source(drive) is TurnSource.SAMPLED_WHEELS:  # too weak to judge fixes one by one: the robust path does
+        return np.ones(len(drive.fixes.stamp_ns), dtype=bool)
     own = {
         verdict.fix_sequence: verdict.accepted
         for verdict in verdicts
