@@ -17,6 +17,7 @@ Ints = NDArray[np.int64]
 
 UNASSIGNED = -1
 NO_IMAGE = -1
+BEYOND_BELIEF = "residual"  # how the reason begins for a label that was tied, solved for, and let go
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -164,12 +165,24 @@ def residuals_m(labels: Labels, assignment: Assignment, landmark_m: Floats, imag
     return residual
 
 
-def without_outliers(assignment: Assignment, residual_m: Floats, sigma_m: Floats, *, limit_sigmas: float) -> Assignment:
-    """The assignment without labels whose residual exceeds the limit (in sigmas of the label itself)."""
+def without_outliers(
+    assignment: Assignment, before: Assignment, residual_m: Floats, sigma_m: Floats, *, limit_sigmas: float
+) -> Assignment:
+    """The assignment without labels that were solved for and whose residual (a, 2) exceeds the limit, in sigmas of
+    the label itself, now or `before`.
+
+    A label tied only now is not judged yet: the offset of an image none of whose labels was tied is unknown.
+    """
     size = np.hypot(*residual_m.T) / sigma_m
-    out = (assignment.landmark >= 0) & (size > limit_sigmas)
+    solved_for = (assignment.landmark >= 0) & (assignment.landmark == before.landmark)
+    out = solved_for & (size > limit_sigmas)
+    stays_out = np.array([why.startswith(BEYOND_BELIEF) for why in before.reason], dtype=bool)
     reason = tuple(
-        f"residual {size[i]:.1f} sigma, limit {limit_sigmas:.1f}" if out[i] else why
+        before.reason[i]
+        if stays_out[i]
+        else f"{BEYOND_BELIEF} {size[i]:.1f} sigma, limit {limit_sigmas:.1f}"
+        if out[i]
+        else why
         for i, why in enumerate(assignment.reason)
     )
-    return Assignment(landmark=np.where(out, UNASSIGNED, assignment.landmark), reason=reason)
+    return Assignment(landmark=np.where(out | stays_out, UNASSIGNED, assignment.landmark), reason=reason)

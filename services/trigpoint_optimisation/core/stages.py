@@ -256,7 +256,8 @@ def renewed_assignment(solved: Solved) -> Assignment:
         shift = np.vstack([state.image_m, np.zeros((1, 2))])[labels.image]
         assignment = nearest_assignment(labels, state.landmark_m, shift_m=shift, sigma_m=sigma, settings=settings)
     residual = residuals_m(labels, assignment, state.landmark_m, state.image_m)
-    return without_outliers(assignment, residual, _residual_sigma(solved), limit_sigmas=settings.outlier_sigmas)
+    limit_sigmas = settings.outlier_sigmas
+    return without_outliers(assignment, solved.assignment, residual, _residual_sigma(solved), limit_sigmas=limit_sigmas)
 
 
 def _expected_sigma(solved: Solved) -> Floats:

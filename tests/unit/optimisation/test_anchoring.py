@@ -169,6 +169,20 @@ def test_a_residual_is_the_label_less_landmark_and_image_offset() -> None:
 def test_an_unbelievable_label_is_let_go_with_its_residual_and_the_limit() -> None:
     assignment = Assignment(landmark=np.array([0, 1]), reason=("mutually nearest", "mutually nearest"))
     residual = np.array([[0.1, 0.0], [0.3, 0.4]])
-    kept = without_outliers(assignment, residual, np.full(2, 0.1), limit_sigmas=4.0)
+    kept = without_outliers(assignment, assignment, residual, np.full(2, 0.1), limit_sigmas=4.0)
     assert kept.landmark.tolist() == [0, UNASSIGNED]
     assert kept.reason == ("mutually nearest", "residual 5.0 sigma, limit 4.0")
+
+
+def test_a_label_tied_only_now_is_not_judged_before_its_images_offset_is_solved_for() -> None:
+    untied = Assignment(landmark=np.array([UNASSIGNED]), reason=("no joint shift stands out",))
+    tied = Assignment(landmark=np.array([3]), reason=("mutually nearest",))
+    kept = without_outliers(tied, untied, np.array([[0.7, 0.3]]), np.array([0.1]), limit_sigmas=4.0)
+    assert kept.landmark.tolist() == [3]
+
+
+def test_a_label_let_go_stays_out_with_its_reason() -> None:
+    let_go = Assignment(landmark=np.array([UNASSIGNED]), reason=("residual 7.6 sigma, limit 4.0",))
+    tied = Assignment(landmark=np.array([3]), reason=("mutually nearest",))
+    kept = without_outliers(tied, let_go, np.array([[0.0, 0.0]]), np.array([0.1]), limit_sigmas=4.0)
+    assert (kept.landmark.tolist(), kept.reason) == ([UNASSIGNED], let_go.reason)
