@@ -46,7 +46,8 @@ CAMERA_CALIBRATION = (  # the states of `sighting_factor`, in their order
     "camera_bearing_rad",
     "camera_bearing_scale",
 )
-BELIEVED_SHARE = 0.7  # of a drive's fixes: a filter that rejects more has probably lost its way
+BELIEVED_SHARE = 0.7  # of a drive's fixes must stand uncontradicted, else the filter has probably lost its way
+CONTRADICTED = "outside gate"  # the verdict's reason for a fix that a filter sure of its position rejected
 UNNUMBERED = 0  # a map version until the log gives it its number
 
 
@@ -86,27 +87,30 @@ def solve_map(
     verdicts: Sequence[FixJudged] | None = None,
     progress: Progress = quiet,
 ) -> Solution:
-    """The map of all drives by the settings' method; with `verdicts`, only fixes the filter accepted take part.
+    """The map of all drives by the settings' method; with `verdicts`, no fix that the filter contradicts takes part.
 
     Raises AlignmentRefused when the data leave a drive's place undetermined.
     """
-    allowed = None if verdicts is None else [accepted_fixes(drive, verdicts) for drive in drives]
+    allowed = None if verdicts is None else [usable_fixes(drive, verdicts) for drive in drives]
     return Solution(solved=solve_fleet(drives, anchors, frame, settings, allowed=allowed, progress=progress))
 
 
-def accepted_fixes(drive: Drive, verdicts: Sequence[FixJudged]) -> Bools:
-    """Which of a drive's fixes (f,) the filter accepted; all of them where it accepted too few to be believed: then
-    it lost its way, and the solve decides by itself."""
+def usable_fixes(drive: Drive, verdicts: Sequence[FixJudged]) -> Bools:
+    """Which of a drive's fixes (f,) the filter does not contradict; all of them where it contradicts so many that it
+    has lost its way itself.
+
+    Fixes it only waited out, before it had a position or while it made sure of one after an outage, are left to the
+    solve: that sees what came after them too.
+    """
     if turn_source(drive) is TurnSource.SAMPLED_WHEELS:  # too weak to judge fixes one by one: the robust path does
         return np.ones(len(drive.fixes.stamp_ns), dtype=bool)
-    own = {
-        verdict.fix_sequence: verdict.accepted
+    contradicted = {
+        verdict.fix_sequence
         for verdict in verdicts
-        if (verdict.vehicle, verdict.boot_id) == (drive.vehicle, drive.boot_id)
+        if (verdict.vehicle, verdict.boot_id, verdict.reason) == (drive.vehicle, drive.boot_id, CONTRADICTED)
     }
-    if sum(own.values()) < BELIEVED_SHARE * len(drive.fixes.stamp_ns):
-        return np.ones(len(drive.fixes.stamp_ns), dtype=bool)
-    return np.array([own.get(int(sequence), False) for sequence in drive.fixes.sequence], dtype=bool)
+    usable = np.array([int(sequence) not in contradicted for sequence in drive.fixes.sequence], dtype=bool)
+    return usable if not len(usable) or usable.mean() >= BELIEVED_SHARE else np.ones_like(usable)
 
 
 def _solved_map(solved: Solved, *, landmark_covariance: Floats) -> SolvedMap:

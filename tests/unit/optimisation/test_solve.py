@@ -12,7 +12,7 @@ from trigpoint.events.corrected import AnchorLabelled
 from trigpoint.events.estimated import FixJudged
 from trigpoint_optimisation.core.anchoring import Assignment, labels_of
 from trigpoint_optimisation.core.fleet import solved_state
-from trigpoint_optimisation.core.solve import Solution, accepted_fixes, solve_map
+from trigpoint_optimisation.core.solve import Solution, solve_map, usable_fixes
 from trigpoint_optimisation.core.stages import Solved, anchored, full_graph, quiet, solve_fleet
 from trigpoint_optimisation.core.state import MapState
 from trigpoint_optimisation.settings import OdometrySettings, SolveSettings
@@ -195,29 +195,34 @@ def test_the_same_drives_give_the_same_bytes() -> None:
     ]
 
 
-def test_a_fix_the_filter_rejected_has_no_say() -> None:
+def test_a_fix_the_filter_contradicts_has_no_say() -> None:
     verdicts = [judged(sequence, accepted=sequence % 10 != 0) for sequence in range(40)]
-    assert accepted_fixes(world(SHORT).drives[0], verdicts).tolist() == [sequence % 10 != 0 for sequence in range(40)]
+    assert usable_fixes(world(SHORT).drives[0], verdicts).tolist() == [sequence % 10 != 0 for sequence in range(40)]
 
 
 def test_a_filter_that_rejects_nearly_everything_lost_its_way() -> None:
     verdicts = [judged(sequence, accepted=sequence % 10 == 0) for sequence in range(40)]
-    assert accepted_fixes(world(SHORT).drives[0], verdicts).all()
+    assert usable_fixes(world(SHORT).drives[0], verdicts).all()
 
 
 def test_another_drives_verdicts_do_not_count() -> None:
     small = world(SHORT)
     verdicts = [judged(sequence, accepted=False, boot_id="other") for sequence in range(40)]
-    assert accepted_fixes(small.drives[0], verdicts).all()
+    assert usable_fixes(small.drives[0], verdicts).all()
 
 
-def judged(sequence: int, *, accepted: bool, boot_id: str = "boot") -> FixJudged:
+def test_a_fix_the_filter_only_waited_out_is_left_to_the_solve() -> None:
+    verdicts = [judged(sequence, accepted=sequence > 5, rejected_for="outage") for sequence in range(40)]
+    assert usable_fixes(world(SHORT).drives[0], verdicts).all()
+
+
+def judged(sequence: int, *, accepted: bool, boot_id: str = "boot", rejected_for: str = "outside gate") -> FixJudged:
     return FixJudged(
         vehicle="car",
         boot_id=boot_id,
         fix_sequence=sequence,
         accepted=accepted,
-        reason="inside gate" if accepted else "outside gate",
+        reason="inside gate" if accepted else rejected_for,
         nis=1.0,
         limit=5.99,
         innovation_x_m=0.0,
