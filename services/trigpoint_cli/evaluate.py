@@ -1,5 +1,6 @@
 """`trigpoint evaluate`: a map against withheld fixes, withheld anchors, or truth."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -20,8 +21,10 @@ from trigpoint_evaluation.app import Evaluated, evaluate_truth, logged_map, read
 from trigpoint_evaluation.core.gnss import (
     FilteredPath,
     GnssEvaluation,
+    WithheldDistances,
     Withholding,
     evaluate_withheld,
+    withheld_distances,
     withheld_fixes,
     without_withheld,
 )
@@ -42,7 +45,16 @@ command.add_command(leave_out)
 @data_option
 @click.option("--withhold-period-s", "period_s", type=float, required=True, metavar="P")
 @click.option("--withhold-duration-s", "duration_s", type=float, required=True, metavar="D")
-@click.option("--withhold-offset-s", "offset_s", type=float, default=0.0, show_default=True, metavar="O")
+@click.option(
+    "--withhold-offset-s",
+    "offsets_s",
+    type=float,
+    multiple=True,
+    default=(0.0,),
+    show_default=True,
+    metavar="O",
+    help="Several are solved one after the other and their fixes pooled.",
+)
 @click.option("--method", type=click.Choice(METHODS), help="Default: anchored where anchors are, else loose.")
 @click.option(
     "--edges",
@@ -53,17 +65,23 @@ command.add_command(leave_out)
 )
 @answering
 def gnss(
-    data: DataDirectory, method: Method | None, edges: Edges | Literal["best"], *, screen: Screen, **withhold: float
+    data: DataDirectory,
+    method: Method | None,
+    edges: Edges | Literal["best"],
+    offsets_s: tuple[float, ...],
+    *,
+    screen: Screen,
+    **withhold: float,
 ) -> Answer:
     """Solve without some fixes, then measure the antenna's distance to them.
 
     Of every P seconds of a drive, D seconds of fixes are withheld, the first time O seconds after its start.
     """
-    withholding = Withholding(**withhold)
+    withholdings = tuple(Withholding(offset_s=offset_s, **withhold) for offset_s in offsets_s)
     with data.opened_log() as log:
         inputs = read_inputs(log, screen)
     settings = settings_for(method, inputs.anchors, edges="close" if edges == "best" else edges)
-    total, vehicles = _withheld_evaluation(inputs, withholding, settings, screen)
+    total, vehicles = _withheld_evaluation(inputs, withholdings, settings, screen)
     values = _gnss_values(total) | {
         "method": settings.method,
         "edges": edges,
@@ -74,20 +92,33 @@ def gnss(
 
 
 def _withheld_evaluation(
-    inputs: Inputs, withholding: Withholding, settings: SolveSettings, screen: Screen
+    inputs: Inputs, withholdings: Sequence[Withholding], settings: SolveSettings, screen: Screen
 ) -> tuple[GnssEvaluation, tuple[GnssEvaluation, ...]]:
+    whole = filter_drives(inputs.drives, inputs.frame, screen)
+    with_all = solve(inputs, settings, screen, verdicts=verdicts_of(whole), what="solving with all fixes")
+    measured: list[WithheldDistances] = []
+    for withholding in withholdings:
+        measured += _withheld_distances(inputs, withholding, settings, screen, _trajectories(with_all))
+    return evaluate_withheld(measured)
+
+
+def _withheld_distances(
+    inputs: Inputs,
+    withholding: Withholding,
+    settings: SolveSettings,
+    screen: Screen,
+    with_all: dict[tuple[str, str], TrajectorySolved],
+) -> tuple[WithheldDistances, ...]:
     withheld = [withheld_fixes(drive, withholding, inputs.frame) for drive in inputs.drives]
     if not any(len(fixes.stamp_ns) for fixes in withheld):
         raise InputError(f"no fix of {len(inputs.drives)} drives falls into the withheld time: nothing to measure")
     seen = replace(inputs, drives=tuple(without_withheld(drive, withholding) for drive in inputs.drives))
     filtered = filter_drives(seen.drives, inputs.frame, screen)
     solution = solve(seen, settings, screen, verdicts=verdicts_of(filtered), what="solving without them")
-    whole = filter_drives(inputs.drives, inputs.frame, screen)
-    with_all = solve(inputs, settings, screen, verdicts=verdicts_of(whole), what="solving with all fixes")
-    return evaluate_withheld(
+    return withheld_distances(
         withheld,
         solved=_trajectories(solution),
-        solved_with_all=_trajectories(with_all),
+        solved_with_all=with_all,
         filtered={(one.vehicle, one.boot_id): _path(one) for one in filtered},
     )
 

@@ -131,7 +131,10 @@ class GnssEvaluation:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Distances:
+class WithheldDistances:
+    """One drive's distances in m: withheld fix to solved antenna (n,), between the solutions there (n,) and at every
+    stamp of the path (k,), and withheld fix to the filter's antenna (n,)."""
+
     vehicle: str
     error_m: Floats
     difference_m: Floats
@@ -139,19 +142,25 @@ class _Distances:
     filter_m: Floats
 
 
-def evaluate_withheld(
+def withheld_distances(
     withheld: Sequence[WithheldFixes],
     *,
     solved: Mapping[DriveName, TrajectorySolved],
     solved_with_all: Mapping[DriveName, TrajectorySolved],
     filtered: Mapping[DriveName, FilteredPath],
-) -> tuple[GnssEvaluation, tuple[GnssEvaluation, ...]]:
-    """The evaluation of all drives together, and of each vehicle; a drive that was not solved adds no error."""
-    measured = [
+) -> tuple[WithheldDistances, ...]:
+    """The distances of every drive; of one that was not solved they are unknown."""
+    return tuple(
         _distances(fixes, solved.get(name), solved_with_all.get(name), filtered.get(name))
         for fixes in withheld
         for name in [(fixes.vehicle, fixes.boot_id)]
-    ]
+    )
+
+
+def evaluate_withheld(
+    measured: Sequence[WithheldDistances],
+) -> tuple[GnssEvaluation, tuple[GnssEvaluation, ...]]:
+    """The evaluation of all drives together, and of each vehicle; of several withholdings the fixes are pooled."""
     vehicles = sorted({one.vehicle for one in measured})
     each = tuple(_evaluation(name, [one for one in measured if one.vehicle == name]) for name in vehicles)
     return _evaluation("", measured), each
@@ -162,10 +171,10 @@ def _distances(
     solved: TrajectorySolved | None,
     solved_with_all: TrajectorySolved | None,
     filtered: FilteredPath | None,
-) -> _Distances:
+) -> WithheldDistances:
     nothing = np.full(len(fixes.stamp_ns), np.nan)
     both = solved is not None and solved_with_all is not None
-    return _Distances(
+    return WithheldDistances(
         vehicle=fixes.vehicle,
         error_m=nothing if solved is None else antenna_errors_m(solved, fixes),
         difference_m=path_differences_m(solved, solved_with_all, fixes.stamp_ns) if both else nothing,  # type: ignore[arg-type]
@@ -174,7 +183,7 @@ def _distances(
     )
 
 
-def _evaluation(vehicle: str, measured: Sequence[_Distances]) -> GnssEvaluation:
+def _evaluation(vehicle: str, measured: Sequence[WithheldDistances]) -> GnssEvaluation:
     def joined(name: str) -> ErrorSummary:
         return summary_of(np.concatenate([np.zeros(0), *(getattr(one, name) for one in measured)]))
 

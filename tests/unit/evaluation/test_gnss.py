@@ -11,6 +11,7 @@ from trigpoint_evaluation.core.gnss import (
     Withholding,
     evaluate_withheld,
     filter_errors_m,
+    withheld_distances,
     withheld_fixes,
     withheld_mask,
     without_withheld,
@@ -49,7 +50,9 @@ def test_a_path_that_is_truth_is_as_far_from_the_fixes_as_they_are_wrong() -> No
     example = solved_example()
     solved = {(one.vehicle, one.boot_id): one for one in example.evaluated.solved.trajectories}
     withheld = [withheld_fixes(drive, HALF, example.evaluated.frame) for drive in example.evaluated.drives]
-    total, vehicles = evaluate_withheld(withheld, solved=solved, solved_with_all=solved, filtered={})
+    total, vehicles = evaluate_withheld(
+        withheld_distances(withheld, solved=solved, solved_with_all=solved, filtered={})
+    )
     assert [one.vehicle for one in vehicles] == ["vehicle-1", "vehicle-2"]
     assert total.path_difference_m.max == 0.0
     assert 2.0 < total.error_m.median < 6.0  # metres: 1.5 white and 2.5 slow an axis are 3.4 in the median
@@ -58,7 +61,7 @@ def test_a_path_that_is_truth_is_as_far_from_the_fixes_as_they_are_wrong() -> No
 def test_a_drive_that_was_not_solved_is_withheld_and_has_no_error() -> None:
     example = solved_example()
     withheld = [withheld_fixes(example.evaluated.drives[0], HALF, example.evaluated.frame)]
-    total, _ = evaluate_withheld(withheld, solved={}, solved_with_all={}, filtered={})
+    total, _ = evaluate_withheld(withheld_distances(withheld, solved={}, solved_with_all={}, filtered={}))
     assert (total.withheld > 0, total.error_m.count) == (True, 0)
 
 

@@ -49,7 +49,7 @@ def test_standing_says_nothing_of_the_wobble() -> None:
 
 
 def test_wobble_goes_and_turns_stay() -> None:
-    rate = 0.1 * (-1.0) ** np.arange(100)
+    rate = np.asarray(0.1 * (-1.0) ** np.arange(100), dtype=np.float64)
     rate[40:60] = 0.8
     kept = without_wobble(rate, 0.1)
     assert np.abs(kept[:38]).max() < 0.03  # rad/s: the ends of the record smooth over two samples only
