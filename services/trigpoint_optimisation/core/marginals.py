@@ -38,15 +38,19 @@ def reduced(graph: gtsam.NonlinearFactorGraph, values: gtsam.Values, kept: Seque
     return Reduced(information=np.asarray(information), gradient=np.asarray(gradient))
 
 
-def pose_covariances(graph: gtsam.NonlinearFactorGraph, values: gtsam.Values, keys: Sequence[int]) -> Floats:
+def pose_covariances(marginals: gtsam.Marginals, values: gtsam.Values, keys: Sequence[int]) -> Floats:
     """Covariances (n, 3, 3) of poses in the map frame: x, y in m, heading in rad."""
-    marginals = gtsam.Marginals(graph, values)
     covariance = np.empty((len(keys), 3, 3))
     for row, key in enumerate(keys):
         heading = values.atPose2(key).theta()
         turn = np.array([[np.cos(heading), -np.sin(heading), 0.0], [np.sin(heading), np.cos(heading), 0.0], [0, 0, 1]])
         covariance[row] = turn @ marginals.marginalCovariance(key) @ turn.T
     return covariance
+
+
+def vector_sigmas(marginals: gtsam.Marginals, keys: Sequence[int]) -> tuple[Floats, ...]:
+    """The 1-sigma of every component of each vector state, in the state's own units."""
+    return tuple(np.sqrt(np.diag(marginals.marginalCovariance(key))) for key in keys)
 
 
 def covariance_of(kept: Reduced) -> Floats:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from hashlib import blake2b
 
+import gtsam
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,7 +18,7 @@ from trigpoint.geodesy.projection import MapFrame
 from trigpoint_optimisation.core.anchoring import residuals_m
 from trigpoint_optimisation.core.fleet import Progress
 from trigpoint_optimisation.core.fleet_placing import LeftOut
-from trigpoint_optimisation.core.marginals import covariance_of, pose_covariances
+from trigpoint_optimisation.core.marginals import covariance_of, pose_covariances, vector_sigmas
 from trigpoint_optimisation.core.odometry import TurnSource, turn_source
 from trigpoint_optimisation.core.preparation import PreparedDrive
 from trigpoint_optimisation.core.stages import (
@@ -28,7 +29,15 @@ from trigpoint_optimisation.core.stages import (
     reduced_landmarks,
     solve_fleet,
 )
-from trigpoint_optimisation.core.state import DriveState, pose_key, values_of
+from trigpoint_optimisation.core.state import (
+    DriveState,
+    antenna_key,
+    pose_key,
+    scale_key,
+    sensor_key,
+    turn_bias_key,
+    values_of,
+)
 from trigpoint_optimisation.core.trajectory import output_stamps, poses_at
 from trigpoint_optimisation.settings import SolveSettings, settings_json
 
@@ -130,32 +139,34 @@ def _solved_map(solved: Solved, *, landmark_covariance: Floats) -> SolvedMap:
     )
 
 
-def _calibration(each: PreparedDrive, drive: DriveState) -> tuple[tuple[str, float, float], ...]:
+def _calibration_sigmas(each: PreparedDrive, drive: DriveState, marginals: gtsam.Marginals) -> Floats:
+    """1-sigma (6,) or, of a camera, (12,) in the order of `_calibration`: scales and delay, middle bias, antenna."""
+    d, middle = each.index, len(drive.turn_bias) // 2
+    keys = [scale_key(d), turn_bias_key(d, middle), antenna_key(d), *([sensor_key(d)] if each.camera else [])]
+    return np.concatenate(vector_sigmas(marginals, keys))
+
+
+def _calibration(each: PreparedDrive, drive: DriveState, sigma: Floats) -> tuple[tuple[str, float, float], ...]:
+    """Name, value and 1-sigma of each calibration state; the turn bias is the one in the middle of the drive."""
     bias_name = {
         TurnSource.IMU: "turn_bias_radps",
         TurnSource.STEERING: "turn_bias_rad",
     }.get(each.source, "turn_bias_radpm")
-    values = {
-        "speed_scale": float(drive.scale[0]),
-        "turn_scale": float(drive.scale[1]),
-        "wheel_delay_s": float(drive.scale[2]),
-        bias_name: float(np.mean(drive.turn_bias)),
-        "antenna_x_m": float(drive.antenna_m[0]),
-        "antenna_y_m": float(drive.antenna_m[1]),
-    }
+    names = ["speed_scale", "turn_scale", "wheel_delay_s", bias_name, "antenna_x_m", "antenna_y_m"]
+    bias = drive.turn_bias[len(drive.turn_bias) // 2]
+    values = [*drive.scale.tolist(), float(bias), *drive.antenna_m.tolist()]
     if each.camera:
-        values |= dict(zip(CAMERA_CALIBRATION, drive.sensor.tolist(), strict=True))
-    return tuple((name, value, float("nan")) for name, value in values.items())
+        names += CAMERA_CALIBRATION
+        values += drive.sensor.tolist()
+    return tuple(zip(names, values, sigma.tolist(), strict=True))
 
 
 def _trajectories(solved: Solved) -> tuple[TrajectorySolved, ...]:
-    graph, values = full_graph(solved), values_of(solved.state)
-    chosen = [_spread(len(drive.pose), COVARIANCE_POSES) for drive in solved.state.drives]
-    keys = [pose_key(d, int(k)) for d, rows in enumerate(chosen) for k in rows]
-    covariance = np.split(pose_covariances(graph, values, keys), np.cumsum([len(rows) for rows in chosen])[:-1])
+    values = values_of(solved.state)
+    marginals = gtsam.Marginals(full_graph(solved), values)
     return tuple(
-        _trajectory(each, drive, each.stamp_ns[rows], own)
-        for each, drive, rows, own in zip(solved.fleet.prepared, solved.state.drives, chosen, covariance, strict=True)
+        _trajectory(each, drive, marginals, values)
+        for each, drive in zip(solved.fleet.prepared, solved.state.drives, strict=True)
     )
 
 
@@ -164,8 +175,12 @@ def _spread(count: int, most: int) -> Ints:
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
 
 
-def _trajectory(each: PreparedDrive, drive: DriveState, at_ns: Ints, covariance: Floats) -> TrajectorySolved:
-    stamp_ns = output_stamps(each, step_s=TRAJECTORY_STEP_S)
+def _trajectory(
+    each: PreparedDrive, drive: DriveState, marginals: gtsam.Marginals, values: gtsam.Values
+) -> TrajectorySolved:
+    rows = _spread(len(drive.pose), COVARIANCE_POSES)
+    at_ns, stamp_ns = each.stamp_ns[rows], output_stamps(each, step_s=TRAJECTORY_STEP_S)
+    covariance = pose_covariances(marginals, values, [pose_key(each.index, int(k)) for k in rows])
     start_ns = int(at_ns[0])
     known_s, wanted_s = (at_ns - start_ns) * 1e-9, (stamp_ns - start_ns) * 1e-9
     flat = covariance.reshape(len(at_ns), 9)
@@ -177,7 +192,7 @@ def _trajectory(each: PreparedDrive, drive: DriveState, at_ns: Ints, covariance:
         stamp_ns=stamp_ns,
         pose=poses_at(each, drive.pose, stamp_ns),
         covariance=between.reshape(-1, 3, 3),
-        calibration=_calibration(each, drive),
+        calibration=_calibration(each, drive, _calibration_sigmas(each, drive, marginals)),
     )
 
 

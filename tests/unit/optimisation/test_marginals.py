@@ -59,5 +59,5 @@ def test_a_pose_covariance_is_in_the_frame_of_the_map() -> None:
     pose = gtsam.Pose2(1.0, 2.0, math.pi / 2)
     values.insert(0, pose)
     graph.add(gtsam.PriorFactorPose2(0, pose, gtsam.noiseModel.Diagonal.Sigmas(np.array([0.1, 2.0, 0.01]))))
-    (covariance,) = pose_covariances(graph, values, [0])
+    (covariance,) = pose_covariances(gtsam.Marginals(graph, values), values, [0])
     np.testing.assert_allclose(np.diag(covariance), [4.0, 0.01, 1e-4], rtol=1e-9)  # rounding
