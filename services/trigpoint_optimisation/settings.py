@@ -72,9 +72,9 @@ class OdometrySettings:
     """Random part of odometry (see OdometryNoise) and where keyframes stand."""
 
     along_m: float = 0.03
-    across_m: float = 0.02
+    across_m: float = 0.025
     across_imu_m: float = 0.01
-    heading_rad: float = 0.004
+    heading_rad: float = 0.005
     heading_imu_rad: float = 0.0001
     heading_rad_per_sqrt_s: float = 0.0003
     turn_fraction: float = 0.02

@@ -96,10 +96,13 @@ def solve_map(
     verdicts: Sequence[FixJudged] | None = None,
     progress: Progress = quiet,
 ) -> Solution:
-    """The map of all drives by the settings' method; with `verdicts`, no fix that the filter contradicts takes part.
+    """The map of all drives by the settings' method; with `verdicts`, no fix that the filter contradicts takes
+    part, unless edges are close.
 
     Raises AlignmentRefused when the data leave a drive's place undetermined.
     """
+    if settings.chosen_edges == "close":  # these follow the receiver, also where it goes astray
+        verdicts = None
     allowed = None if verdicts is None else [usable_fixes(drive, verdicts) for drive in drives]
     return Solution(solved=solve_fleet(drives, anchors, frame, settings, allowed=allowed, progress=progress))
 
