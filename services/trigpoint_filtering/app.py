@@ -19,9 +19,9 @@ from trigpoint.events.observed import (
     WheelPairMeasured,
     WheelSpeedMeasured,
 )
-from trigpoint.geodesy.positions import GridPosition
-from trigpoint.geodesy.projection import MapFrame, pin_map_frame
+from trigpoint.geodesy.projection import MapFrame
 from trigpoint.logs.ports import EventLog
+from trigpoint.logs.readings import pinned_frame
 from trigpoint_filtering.core.publication import UNSAID, Published, Said, output_boot_id, published
 from trigpoint_filtering.core.track import begun_track, tracks
 from trigpoint_filtering.settings import FilterSettings
@@ -55,7 +55,7 @@ def filter_log(
 
     A drive that cannot be filtered is reported with the reason, and the others go on. Raises AppendFailed.
     """
-    chosen, frame, said = settings or FilterSettings(), logged_frame(log), said_of(log)
+    chosen, frame, said = settings or FilterSettings(), pinned_frame(log), said_of(log)
     if frame is None:
         logger.warning("nothing filtered: no map frame is pinned in stream %r", FRAME_STREAM)
         return ()
@@ -64,14 +64,6 @@ def filter_log(
         before = said.get(output_boot_id(drive.vehicle, drive.boot_id, frame, chosen), UNSAID)
         reports.append(_filtered(log, drive, frame, chosen, before, progress))
     return tuple(reports)
-
-
-def logged_frame(log: EventLog) -> MapFrame | None:
-    """The map's frame as the log has it, None before it was pinned."""
-    for logged in log.read(FRAME_STREAM, kinds=(MapFramePinned,)):
-        pinned = cast(MapFramePinned, logged.envelope.event)
-        return pin_map_frame(crs=pinned.crs, origin=GridPosition(pinned.origin_easting_m, pinned.origin_northing_m))
-    return None
 
 
 def logged_drives(log: EventLog) -> Iterator[Drive]:

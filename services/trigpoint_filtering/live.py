@@ -13,7 +13,8 @@ from trigpoint.events.keys import DEFAULT_ROOT, KEY_VERSION, STREAM_PATTERNS, ke
 from trigpoint.events.observed import Observed, VehicleDescribed
 from trigpoint.geodesy.projection import MapFrame
 from trigpoint.logs.ports import EventLog
-from trigpoint_filtering.app import STREAM, logged_frame, said_of
+from trigpoint.logs.readings import pinned_frame
+from trigpoint_filtering.app import STREAM, said_of
 from trigpoint_filtering.core.follower import DriveFollower
 from trigpoint_filtering.settings import FilterSettings
 
@@ -55,7 +56,7 @@ class LiveFiltering:
 
     def _take(self, message: BusMessage) -> None:
         drive, sequence = (message.identity.source, message.identity.boot_id), message.identity.sequence
-        self._frame = self._frame or logged_frame(self._log)
+        self._frame = self._frame or pinned_frame(self._log)
         expected = self._expected.get(drive, 0)
         if self._frame is None or sequence < expected:
             return  # before the frame is pinned nothing can be placed: the log still has the message then
@@ -66,7 +67,7 @@ class LiveFiltering:
 
     def catch_up(self, drive: tuple[str, str], *, until_sequence: int | None = None) -> None:
         """The drive's events that are in the log and were not heard, taken, up to a sequence."""
-        frame = self._frame = self._frame or logged_frame(self._log)
+        frame = self._frame = self._frame or pinned_frame(self._log)
         if frame is None:
             return
         missing = []
