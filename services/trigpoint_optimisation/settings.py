@@ -8,6 +8,16 @@ Method = Literal["rigid", "loose", "anchored"]
 Edges = Literal["paper", "honest", "close"]
 
 
+@dataclass(frozen=True, slots=True)
+class Kernel:
+    """What becomes of residuals that are too large. Cauchy counts a residual ever less the larger it is, those within
+    `sigmas` a little less too. Dynamic covariance scaling (Agarwal et al. 2013) leaves those within `sigmas` alone,
+    so that the solution stays where it is, and its covariance true, when the map as a whole is moved."""
+
+    kind: Literal["cauchy", "dcs"]
+    sigmas: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FixSettings:
     """How GNSS fixes enter the graph: an edge every `spacing_m` of path, white error `sigma_m` per axis, and a
@@ -17,23 +27,33 @@ class FixSettings:
     sigma_m: float
     bias_sigma_m: float
     bias_time_s: float
-    cauchy_scale: float  # residuals beyond this many sigmas count ever less
+    kernel: Kernel
     landmark_slack_m: float = 0.0  # error granted to each sighting so that landmarks give way to the fixes
+    landmark_kernel: Kernel = Kernel("cauchy", 3.0)  # of sightings averaged over a keyframe
 
 
 # Yi, Worrall and Nebot, section III-B: one edge every 10 m of travel, sigma 5 m east and north.
-PAPER_EDGES = FixSettings(spacing_m=10.0, sigma_m=5.0, bias_sigma_m=0.0, bias_time_s=1.0, cauchy_scale=2.0)
+PAPER_EDGES = FixSettings(spacing_m=10.0, sigma_m=5.0, bias_sigma_m=0.0, bias_time_s=1.0, kernel=Kernel("cauchy", 2.0))
 # The receiver is the reference: where it will be is told best by a path that stays close to its neighbouring fixes,
 # also where it wanders off together with them; landmarks of other passes give way.
 CLOSE_EDGES = FixSettings(
-    spacing_m=2.0, sigma_m=0.5, bias_sigma_m=0.0, bias_time_s=1.0, cauchy_scale=3.0, landmark_slack_m=4.0
+    spacing_m=2.0, sigma_m=0.5, bias_sigma_m=0.0, bias_time_s=1.0, kernel=Kernel("cauchy", 3.0), landmark_slack_m=4.0
 )
 # Each fix says so little that a hundred wrong ones in a row do not bend the path: to decide which fixes to trust.
-SELECTION_EDGES = FixSettings(spacing_m=1.0, sigma_m=15.0, bias_sigma_m=0.0, bias_time_s=1.0, cauchy_scale=0.3)
+SELECTION_EDGES = FixSettings(
+    spacing_m=1.0, sigma_m=15.0, bias_sigma_m=0.0, bias_time_s=1.0, kernel=Kernel("cauchy", 0.3)
+)
 # Beside odometry that is unsure within metres, a slow error of its own keeps a wandering receiver from bending it.
 SAMPLED_SELECTION_EDGES = replace(SELECTION_EDGES, bias_sigma_m=3.0, bias_time_s=60.0)
 # The error of real receivers is correlated over tens of seconds: white part and slow part apart.
-HONEST_EDGES = FixSettings(spacing_m=2.0, sigma_m=1.5, bias_sigma_m=2.5, bias_time_s=300.0, cauchy_scale=2.0)
+HONEST_EDGES = FixSettings(
+    spacing_m=2.0,
+    sigma_m=1.5,
+    bias_sigma_m=2.5,
+    bias_time_s=300.0,
+    kernel=Kernel("dcs", 3.0),
+    landmark_kernel=Kernel("dcs", 3.0),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,10 +94,10 @@ class OdometrySettings:
     along_m: float = 0.03
     across_m: float = 0.025
     across_imu_m: float = 0.01
-    heading_rad: float = 0.005
+    heading_rad: float = 0.0015
     heading_imu_rad: float = 0.0001
     heading_rad_per_sqrt_s: float = 0.0003
-    turn_fraction: float = 0.02
+    turn_fraction: float = 0.035
     turn_fraction_imu: float = 0.001
     floor_m: float = 0.005
     floor_rad: float = 0.0005
@@ -111,11 +131,10 @@ class DetectionSettings:
     min_votes: int = 5
     merge_gate_m: float = 1.0
     split_gate_m: float = 1.5
-    cauchy_scale: float = 3.0
     camera_range: float = 0.005  # ln range
     camera_inverse_range_per_m: float = 0.0014  # of 1 / range: a constant error in the image
     camera_bearing_rad: float = 0.007
-    single_cauchy_scale: float = 2.0  # of sightings that enter the graph one by one
+    single_kernel: Kernel = Kernel("cauchy", 2.0)  # of sightings that enter the graph one by one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,7 +147,6 @@ class AnchorSettings:
     min_votes: int = 5
     gate_sigmas: float = 3.5
     second_ratio: float = 2.0
-    cauchy_scale: float = 2.0
     outlier_sigmas: float = 4.0
     rounds: int = 5
     landmark_sigma_m: float = 0.10  # local error of a landmark beside its label

@@ -1,6 +1,9 @@
 """The simulated campus over ten seeds: held-out labels, landmarks against truth, consistency, gate, bad anchors."""
 
 import json
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from math import cos, pi, radians, sin
 from pathlib import Path
@@ -39,8 +42,15 @@ def left_out(bench: Workbench, seed: int, *words: str | int, known: bool = False
     return bench.run("evaluate", "leave-out", "--data", data, *words, "--seed", seed, "--json")
 
 
-def mean_over_seeds(outcomes: list[Outcome], path: str) -> Measurement:
+def over(seeds: Iterable[int], outcome_of: Callable[[int], Outcome]) -> list[Outcome]:
+    """An outcome a seed, as many seeds at once as there are cores."""
+    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+        return list(pool.map(outcome_of, seeds))
+
+
+def mean_over_seeds(outcome_of: Callable[[int], Outcome], path: str) -> Measurement:
     """The mean of one number over the seeds; the command shown is the first seed's."""
+    outcomes = over(SEEDS, outcome_of)
     value = fmean(outcome.at(path) for outcome in outcomes)
     return Measurement(value=value, command=f"{outcomes[0].command}  # and {len(outcomes) - 1} other seeds")
 
@@ -49,7 +59,7 @@ def held_out(name: str, target: Bounds | None, *words: str | int, known: bool = 
     """The mean error of held-out labels."""
 
     def measure(bench: Workbench) -> Measurement:
-        return mean_over_seeds([left_out(bench, seed, *words, known=known) for seed in SEEDS], "error_m.mean")
+        return mean_over_seeds(lambda seed: left_out(bench, seed, *words, known=known), "error_m.mean")
 
     return Figure(name=f"held-out labels, {name}, mean", unit="m", target=target, measure=measure)
 
@@ -58,7 +68,7 @@ def of_demo(name: str, unit: str, target: Bounds | None, path: str) -> Figure:
     """One number of `demo --json`, mean over the seeds."""
 
     def measure(bench: Workbench) -> Measurement:
-        return mean_over_seeds([driven(bench, seed) for seed in SEEDS], path)
+        return mean_over_seeds(lambda seed: driven(bench, seed), path)
 
     return Figure(name=name, unit=unit, target=target, measure=measure)
 
@@ -106,7 +116,7 @@ def misplaced_labels(bench: Workbench, seed: int) -> str:
 
 def gain_of_offsets(bench: Workbench) -> Measurement:
     """What the images' own offsets gain."""
-    bare = [rebuilt(bench, seed, "bare", clean_labels(bench, seed), "--no-image-offsets") for seed in FEW_SEEDS]
+    bare = over(FEW_SEEDS, lambda seed: rebuilt(bench, seed, "bare", clean_labels(bench, seed), "--no-image-offsets"))
     gain = fmean(
         o.at("error_m.mean") - driven(bench, s).at("error_m.mean") for s, o in zip(FEW_SEEDS, bare, strict=True)
     )
@@ -115,7 +125,7 @@ def gain_of_offsets(bench: Workbench) -> Measurement:
 
 def misplaced_ratio(bench: Workbench) -> Measurement:
     """The landmark error with misplaced labels over the clean one."""
-    wrong = [rebuilt(bench, seed, "misplaced", misplaced_labels(bench, seed)) for seed in FEW_SEEDS]
+    wrong = over(FEW_SEEDS, lambda seed: rebuilt(bench, seed, "misplaced", misplaced_labels(bench, seed)))
     clean = fmean(driven(bench, seed).at("error_m.mean") for seed in FEW_SEEDS)
     ratio = fmean(outcome.at("error_m.mean") for outcome in wrong) / clean
     return Measurement(value=ratio, command=f"{wrong[0].command}  # over the demo's, {len(wrong)} seeds")

@@ -30,7 +30,7 @@ from trigpoint_optimisation.core.state import (
     sensor_key,
     turn_bias_key,
 )
-from trigpoint_optimisation.settings import CalibrationPriors, FixSettings
+from trigpoint_optimisation.settings import CalibrationPriors, FixSettings, Kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -52,11 +52,14 @@ class TiedLabels:
     image_sigma_m: Floats
 
 
-def with_cauchy(noise: gtsam.noiseModel.Base, scale: float | None) -> gtsam.noiseModel.Base:
-    """The noise under a Cauchy kernel of that many sigmas, or as it is."""
-    if scale is None:
+def with_kernel(noise: gtsam.noiseModel.Base, kernel: Kernel | None) -> gtsam.noiseModel.Base:
+    """The noise under a kernel, or as it is."""
+    if kernel is None:
         return noise
-    return gtsam.noiseModel.Robust.Create(gtsam.noiseModel.mEstimator.Cauchy.Create(scale), noise)
+    estimators = gtsam.noiseModel.mEstimator
+    if kernel.kind == "dcs":  # its parameter is a chi-square
+        return gtsam.noiseModel.Robust.Create(estimators.DCS.Create(kernel.sigmas**2), noise)
+    return gtsam.noiseModel.Robust.Create(estimators.Cauchy.Create(kernel.sigmas), noise)
 
 
 def _calibration_vector(calibration: OdometryCalibration, knot: int) -> Floats:
@@ -178,7 +181,7 @@ def add_fixes(
     """Edges from the chosen fixes (indices) to the map's origin."""
     d, knot_ns = prepared.index, fix_bias_stamps(prepared, fixes)
     add_fix_bias(graph, d, knot_ns, fixes)
-    noise = with_cauchy(gtsam.noiseModel.Isotropic.Sigma(2, fixes.sigma_m), fixes.cauchy_scale if robust else None)
+    noise = with_kernel(gtsam.noiseModel.Isotropic.Sigma(2, fixes.sigma_m), fixes.kernel if robust else None)
     for row in rows:
         keys = [pose_key(d, int(prepared.fix_keyframe[row])), antenna_key(d)]
         weight = (0.0, 0.0)
@@ -192,7 +195,7 @@ def add_fixes(
 
 
 def add_sightings(
-    graph: gtsam.NonlinearFactorGraph, sightings: Sightings, landmark: Ints, *, cauchy_scale: float | None
+    graph: gtsam.NonlinearFactorGraph, sightings: Sightings, landmark: Ints, *, kernel: Kernel | None
 ) -> None:
     """Bearing and range from keyframe to landmark; `landmark` (s,) by sighting, negative ones left out."""
     x, y = sightings.point_m.T
@@ -202,13 +205,13 @@ def add_sightings(
     covariance = to_polar @ sightings.covariance @ to_polar.transpose(0, 2, 1)
     bearing = np.arctan2(y, x)
     for row in rows:
-        noise = with_cauchy(gtsam.noiseModel.Gaussian.Covariance(covariance[row]), cauchy_scale)
+        noise = with_kernel(gtsam.noiseModel.Gaussian.Covariance(covariance[row]), kernel)
         keys = pose_key(int(sightings.drive[row]), int(sightings.keyframe[row])), landmark_key(int(landmark[row]))
         graph.add(gtsam.BearingRangeFactor2D(*keys, gtsam.Rot2(bearing[row]), range_m[row], noise))
 
 
 def add_single_sightings(
-    graph: gtsam.NonlinearFactorGraph, sightings: SingleSightings, *, cauchy_scale: float | None
+    graph: gtsam.NonlinearFactorGraph, sightings: SingleSightings, *, kernel: Kernel | None
 ) -> None:
     """Every sighting of a landmark by a camera, and of another vehicle's keyframe, through the sensor's calibration."""
     for row, (d, landmark) in enumerate(zip(sightings.drive, sightings.landmark, strict=True)):
@@ -225,11 +228,11 @@ def add_single_sightings(
         else:
             seen = pose_key(int(sightings.seen_drive[row]), int(sightings.seen_keyframe[row]))
         keys = pose_key(int(d), int(sightings.keyframe[row])), sensor_key(int(d)), seen
-        noise = with_cauchy(gtsam.noiseModel.Diagonal.Sigmas(sightings.sigma[row]), cauchy_scale)
+        noise = with_kernel(gtsam.noiseModel.Diagonal.Sigmas(sightings.sigma[row]), kernel)
         graph.add(sighting_factor(keys, measured, noise=noise))
 
 
-def add_labels(graph: gtsam.NonlinearFactorGraph, labels: TiedLabels, *, cauchy_scale: float | None) -> None:
+def add_labels(graph: gtsam.NonlinearFactorGraph, labels: TiedLabels) -> None:
     """Anchors: labels tied to landmarks, through their image's offset where they have an image."""
     for i, sigma_m in enumerate(labels.image_sigma_m):
         graph.add(gtsam.PriorFactorVector(image_key(i), np.zeros(2), gtsam.noiseModel.Isotropic.Sigma(2, sigma_m)))
@@ -237,7 +240,7 @@ def add_labels(graph: gtsam.NonlinearFactorGraph, labels: TiedLabels, *, cauchy_
         keys = [landmark_key(int(landmark))]
         if labels.image[row] >= 0:
             keys.append(image_key(int(labels.image[row])))
-        noise = with_cauchy(gtsam.noiseModel.Isotropic.Sigma(2, labels.sigma_m[row]), cauchy_scale)
+        noise = gtsam.noiseModel.Isotropic.Sigma(2, labels.sigma_m[row])
         graph.add(anchor_factor(tuple(keys), labels.label_m[row], noise=noise))
 
 

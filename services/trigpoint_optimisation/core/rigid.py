@@ -74,9 +74,8 @@ def rigid_state(fleet: Fleet, state: MapState, seen: Seen) -> MapState:
 def rigid_graph(fleet: Fleet, state: MapState, seen: Seen) -> gtsam.NonlinearFactorGraph:
     """Odometry and landmarks, each connected group held where the state has it, as surely as its fixes could say."""
     graph = motion_graph(fleet)
-    kernels = fleet.settings.detections
-    add_sightings(graph, seen.sightings, seen.landmark, cauchy_scale=kernels.cauchy_scale)
-    add_single_sightings(graph, seen.singles, cauchy_scale=kernels.single_cauchy_scale)
+    add_sightings(graph, seen.sightings, seen.landmark, kernel=fleet.settings.fixes.landmark_kernel)
+    add_single_sightings(graph, seen.singles, kernel=fleet.settings.detections.single_kernel)
     for group in connected_drives(seen, len(fleet.prepared)):
         d = group[0]
         middle = len(state.drives[d].pose) // 2

@@ -61,7 +61,7 @@ def _hung_fixes(prepared: PreparedDrive, usable: Bools, point_scale: float) -> H
         keyframe=prepared.fix_keyframe[usable],
         antenna_m=transform_points(offset, np.broadcast_to(arm, (len(offset), 2))),
         sigma_m=edges.sigma_m,
-        cauchy_m=edges.cauchy_scale * edges.sigma_m,
+        cauchy_m=edges.kernel.sigmas * edges.sigma_m,
         slow_m=edges.bias_sigma_m,
         slow_s=edges.bias_time_s,
     )

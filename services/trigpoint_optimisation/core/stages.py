@@ -48,14 +48,14 @@ from trigpoint_optimisation.core.rigid import Seen, rigid_graph, rigid_state
 from trigpoint_optimisation.core.sightings import Sightings
 from trigpoint_optimisation.core.single_sightings import SingleSightings
 from trigpoint_optimisation.core.state import MapState, image_key, landmark_key, values_of
-from trigpoint_optimisation.settings import SolveSettings
+from trigpoint_optimisation.settings import Kernel, SolveSettings
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 ASSOCIATION_ROUNDS = 3
-SINGLE_CAUCHY_SCALES = (10.0, 3.0, 2.0)
+SINGLE_KERNELS = (Kernel("cauchy", 10.0), Kernel("cauchy", 3.0), Kernel("cauchy", 2.0))
 SINGLE_ITERATIONS = 5  # at each of them: where it ends is only the next one's start
 
 
@@ -170,11 +170,11 @@ def _resighted(solved: Solved) -> Solved:
 def _calibrated(solved: Solved, progress: Progress) -> Solved:
     """The solve from wide kernels on single sightings to narrow ones: a sensor far from its nominal calibration
     would have its sightings taken for outliers."""
-    for turn, cauchy_scale in enumerate(SINGLE_CAUCHY_SCALES):
-        graph = full_graph(solved, single_cauchy_scale=cauchy_scale)
+    for turn, kernel in enumerate(SINGLE_KERNELS):
+        graph = full_graph(solved, single_kernel=kernel)
         state = solved_state(graph, solved.state, max_iterations=SINGLE_ITERATIONS)
         solved = _resighted(replace(solved, fleet=recalibrated(solved.fleet, state), state=state))
-        progress("calibration", (turn + 1) / len(SINGLE_CAUCHY_SCALES))
+        progress("calibration", (turn + 1) / len(SINGLE_KERNELS))
     return solved
 
 
@@ -190,19 +190,18 @@ def seen_by(solved: Solved) -> Seen:
 
 
 def full_graph(
-    solved: Solved, *, with_labels: bool = True, single_cauchy_scale: float | None = None
+    solved: Solved, *, with_labels: bool = True, single_kernel: Kernel | None = None
 ) -> gtsam.NonlinearFactorGraph:
     """The graph of a solve: odometry, fixes, landmarks, and labels if wanted; kernels on fixes, landmarks, labels."""
     settings, seen = solved.fleet.settings, seen_by(solved)
     if settings.method == "rigid" and not with_fix_bias(solved.state):
         return rigid_graph(solved.fleet, solved.state, seen)
     graph = georeferenced_graph(solved.fleet, robust=True)
-    add_sightings(graph, seen.sightings, seen.landmark, cauchy_scale=settings.detections.cauchy_scale)
-    kernel = single_cauchy_scale or settings.detections.single_cauchy_scale
-    add_single_sightings(graph, seen.singles, cauchy_scale=kernel)
+    add_sightings(graph, seen.sightings, seen.landmark, kernel=settings.fixes.landmark_kernel)
+    add_single_sightings(graph, seen.singles, kernel=single_kernel or settings.detections.single_kernel)
     if with_labels:
         tied, _ = tied_labels(solved.labels, solved.assignment)
-        add_labels(graph, tied, cauchy_scale=None)
+        add_labels(graph, tied)
     return graph
 
 

@@ -18,7 +18,7 @@ from trigpoint_optimisation.core.graph import (
     chosen_fixes,
     fix_bias_stamps,
     fleet_graph,
-    with_cauchy,
+    with_kernel,
 )
 from trigpoint_optimisation.core.odometry import relative_poses
 from trigpoint_optimisation.core.preparation import PreparedDrive, nominal_calibration, prepared_drive
@@ -34,7 +34,14 @@ from trigpoint_optimisation.core.state import (
     state_of,
     values_of,
 )
-from trigpoint_optimisation.settings import HONEST_EDGES, PAPER_EDGES, FixSettings, OdometrySettings, SolveSettings
+from trigpoint_optimisation.settings import (
+    HONEST_EDGES,
+    PAPER_EDGES,
+    FixSettings,
+    Kernel,
+    OdometrySettings,
+    SolveSettings,
+)
 
 Floats = NDArray[np.float64]
 
@@ -188,7 +195,7 @@ def landmark_covariance(point_m: Floats, *, sigma_m: float) -> Floats:
     values.insert(pose_key(0, 0), pose)
     values.insert(landmark_key(0), pose.transformFrom(point_m))
     graph.add(gtsam.PriorFactorPose2(pose_key(0, 0), pose, gtsam.noiseModel.Isotropic.Sigma(3, 1e-6)))
-    add_sightings(graph, sighted(point_m, sigma_m=sigma_m), np.zeros(1, dtype=np.int64), cauchy_scale=None)
+    add_sightings(graph, sighted(point_m, sigma_m=sigma_m), np.zeros(1, dtype=np.int64), kernel=None)
     covariance: Floats = gtsam.Marginals(graph, values).marginalCovariance(landmark_key(0))
     return covariance
 
@@ -201,8 +208,8 @@ def test_a_sighting_is_as_strong_in_metres_at_any_range(point_m: tuple[float, fl
 
 def test_a_sighting_of_no_landmark_and_one_at_the_bases_origin_are_left_out() -> None:
     graph = gtsam.NonlinearFactorGraph()
-    add_sightings(graph, sighted(np.array([5.0, 0.0]), sigma_m=0.1), np.full(1, -1), cauchy_scale=None)
-    add_sightings(graph, sighted(np.array([0.1, 0.0]), sigma_m=0.1), np.zeros(1, dtype=np.int64), cauchy_scale=None)
+    add_sightings(graph, sighted(np.array([5.0, 0.0]), sigma_m=0.1), np.full(1, -1), kernel=None)
+    add_sightings(graph, sighted(np.array([0.1, 0.0]), sigma_m=0.1), np.zeros(1, dtype=np.int64), kernel=None)
     assert graph.size() == 0
 
 
@@ -215,7 +222,7 @@ def test_a_label_in_an_image_is_as_sure_as_both_together() -> None:
         image=np.array([0]),
         image_sigma_m=np.array([0.35]),
     )
-    add_labels(graph, labels, cauchy_scale=None)
+    add_labels(graph, labels)
     values.insert(landmark_key(0), np.zeros(2))
     values.insert(image_key(0), np.zeros(2))
     covariance = gtsam.Marginals(graph, values).marginalCovariance(landmark_key(0))
@@ -224,7 +231,19 @@ def test_a_label_in_an_image_is_as_sure_as_both_together() -> None:
 
 def test_no_kernel_is_the_noise_itself() -> None:
     noise = gtsam.noiseModel.Unit.Create(2)
-    assert with_cauchy(noise, None) is noise
+    assert with_kernel(noise, None) is noise
+
+
+def test_dynamic_covariance_scaling_leaves_residuals_within_its_sigmas_alone_and_cauchy_does_not() -> None:
+    within = 2.5**2  # squared, in sigmas; a plain loss is half of it
+    unit = gtsam.noiseModel.Unit.Create(2)
+    assert with_kernel(unit, Kernel("dcs", 3.0)).loss(within) == within / 2.0
+    assert with_kernel(unit, Kernel("cauchy", 3.0)).loss(within) < within / 2.0
+
+
+def test_dynamic_covariance_scaling_bounds_what_a_wrong_sighting_costs() -> None:
+    scaled = with_kernel(gtsam.noiseModel.Unit.Create(2), Kernel("dcs", 3.0))
+    assert scaled.loss(50.0**2) < scaled.loss(500.0**2) < 1.5 * 3.0**2  # its limit
 
 
 def test_a_state_comes_back_from_its_values_unchanged(prepared: PreparedDrive) -> None:
