@@ -1,6 +1,6 @@
 """Projects solved map versions into the landmark database, and answers questions about the map.
 
-Reads: AnchorAssociated, AnchorLabelled, ImageOffsetSolved, LandmarkSolved, MapFramePinned, MapSolved,
+Reads: AnchorAssociated, AnchorLabelled, AnchorRetracted, ImageOffsetSolved, LandmarkSolved, MapFramePinned, MapSolved,
 TrajectorySolved
 Writes: (nothing)
 """

@@ -1,6 +1,6 @@
 """Solves one factor graph for the whole fleet and says where every landmark and every path lies.
 
 Reads: VehicleDescribed, WheelSpeedMeasured, WheelPairMeasured, ImuMeasured, GnssFixReceived, LandmarksDetected,
-MapFramePinned, AnchorLabelled, FixJudged
-Writes: MapSolved, TrajectorySolved, LandmarkSolved, AnchorAssociated, ImageOffsetSolved
+MapFramePinned, AnchorLabelled, AnchorRetracted, DriveExcluded, DriveIncluded, FixJudged
+Writes: MapSolved, TrajectorySolved, LandmarkSolved, AnchorAssociated, ImageOffsetSolved, OdometryCorrected
 """

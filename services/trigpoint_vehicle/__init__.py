@@ -1,5 +1,5 @@
 """Recorded and simulated drives become vehicles' logs, with their truth and anchors kept apart.
 
-Reads: (nothing)
+Reads: OdometryCorrected
 Writes: VehicleDescribed, WheelSpeedMeasured, WheelPairMeasured, ImuMeasured, GnssFixReceived, LandmarksDetected
 """

@@ -4,10 +4,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TypeVar
 
-from trigpoint.events.corrected import AnchorLabelled
+from trigpoint.events.corrected import AnchorLabelled, AnchorRetracted, DriveExcluded, DriveIncluded
 from trigpoint.events.estimated import FixJudged, GateAlarmed, PoseFiltered
 from trigpoint.events.keys import KEY_PATTERNS, KEY_VERSION, STREAM_PATTERNS
-from trigpoint.events.mapped import AnchorAssociated, ImageOffsetSolved, LandmarkSolved, MapSolved, TrajectorySolved
+from trigpoint.events.mapped import (
+    AnchorAssociated,
+    ImageOffsetSolved,
+    LandmarkSolved,
+    MapSolved,
+    OdometryCorrected,
+    TrajectorySolved,
+)
 from trigpoint.events.observed import (
     EventRefused,
     GnssFixReceived,
@@ -71,6 +78,9 @@ FLOWS: tuple[Flow, ...] = (
     Flow(EventRefused, INGEST, (EVALUATION,)),
     Flow(MapFramePinned, INGEST, (FILTERING, OPTIMISATION, LANDMARKS, EVALUATION)),
     Flow(AnchorLabelled, INGEST, (OPTIMISATION, LANDMARKS, EVALUATION)),
+    Flow(AnchorRetracted, INGEST, (OPTIMISATION, LANDMARKS)),
+    Flow(DriveExcluded, INGEST, (OPTIMISATION,)),
+    Flow(DriveIncluded, INGEST, (OPTIMISATION,)),
     Flow(FixJudged, FILTERING, (OPTIMISATION, EVALUATION)),
     Flow(PoseFiltered, FILTERING, (EVALUATION,)),
     Flow(GateAlarmed, FILTERING, (EVALUATION,)),
@@ -79,6 +89,7 @@ FLOWS: tuple[Flow, ...] = (
     Flow(AnchorAssociated, OPTIMISATION, (LANDMARKS, EVALUATION)),
     Flow(ImageOffsetSolved, OPTIMISATION, (LANDMARKS, EVALUATION)),
     Flow(MapSolved, OPTIMISATION, (LANDMARKS, EVALUATION)),
+    Flow(OdometryCorrected, OPTIMISATION, (VEHICLE,)),
 )
 
 

@@ -9,9 +9,16 @@ from hypothesis.extra.numpy import arrays
 from hypothesis.strategies import SearchStrategy
 
 from trigpoint.events.codec import Event
-from trigpoint.events.corrected import AnchorLabelled
+from trigpoint.events.corrected import AnchorLabelled, AnchorRetracted, DriveExcluded, DriveIncluded
 from trigpoint.events.estimated import FixJudged, GateAlarmed, PoseFiltered
-from trigpoint.events.mapped import AnchorAssociated, ImageOffsetSolved, LandmarkSolved, MapSolved, TrajectorySolved
+from trigpoint.events.mapped import (
+    AnchorAssociated,
+    ImageOffsetSolved,
+    LandmarkSolved,
+    MapSolved,
+    OdometryCorrected,
+    TrajectorySolved,
+)
 from trigpoint.events.observed import (
     EventRefused,
     GnssFixReceived,
@@ -39,6 +46,9 @@ FLAT = (
     ImuMeasured,
     MapFramePinned,
     AnchorLabelled,
+    AnchorRetracted,
+    DriveExcluded,
+    DriveIncluded,
     FixJudged,
     GateAlarmed,
 )
@@ -108,6 +118,8 @@ ANY_EVENT: dict[type, SearchStrategy[object]] = {
         landmark_count=any_int,
         anchor_count=any_int,
         wall_s=any_float,
+        base_version=any_int,
+        removed=_texts,
     ),
     TrajectorySolved: st.integers(0, 3).flatmap(_trajectory),
     LandmarkSolved: st.builds(
@@ -135,6 +147,14 @@ ANY_EVENT: dict[type, SearchStrategy[object]] = {
     ),
     ImageOffsetSolved: st.builds(
         ImageOffsetSolved, map_version=any_int, image=any_text, offset_m=_array(2), covariance_m2=_array(2, 2)
+    ),
+    OdometryCorrected: st.builds(
+        OdometryCorrected,
+        vehicle=any_text,
+        boot_id=any_text,
+        map_version=any_int,
+        T_map_odom=_array(3),
+        covariance=_array(3, 3),
     ),
 }
 

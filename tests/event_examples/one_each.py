@@ -5,10 +5,17 @@ import math
 import numpy as np
 
 from trigpoint.events.codec import Event
-from trigpoint.events.corrected import AnchorLabelled
+from trigpoint.events.corrected import AnchorLabelled, AnchorRetracted, DriveExcluded, DriveIncluded
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.estimated import FixJudged, GateAlarmed, PoseFiltered
-from trigpoint.events.mapped import AnchorAssociated, ImageOffsetSolved, LandmarkSolved, MapSolved, TrajectorySolved
+from trigpoint.events.mapped import (
+    AnchorAssociated,
+    ImageOffsetSolved,
+    LandmarkSolved,
+    MapSolved,
+    OdometryCorrected,
+    TrajectorySolved,
+)
 from trigpoint.events.observed import (
     EventRefused,
     GnssFixReceived,
@@ -56,6 +63,9 @@ EVENTS: tuple[Event, ...] = (
         source_crs="EPSG:7856",
         operation="GDA2020 to WGS 84 (2)",
     ),
+    AnchorRetracted(anchor="a1", image="west", author="surveyor", reason="the pole was moved"),
+    DriveExcluded(vehicle="van", boot_id="boot-1", author="operator", reason="antenna came loose"),
+    DriveIncluded(vehicle="van", boot_id="boot-1", author="operator", reason="it had not"),
     FixJudged(
         vehicle="van",
         boot_id="boot-1",
@@ -111,6 +121,13 @@ EVENTS: tuple[Event, ...] = (
     ),
     AnchorAssociated(map_version=3, anchor="a1", landmark="lm-7", reason="", residual_m=np.array([0.1, -0.2])),
     ImageOffsetSolved(map_version=3, image="west", offset_m=np.array([0.3, 0.1]), covariance_m2=np.diag([0.01, 0.02])),
+    OdometryCorrected(
+        vehicle="van",
+        boot_id="boot-1",
+        map_version=3,
+        T_map_odom=np.array([10.0, -4.0, 0.2]),
+        covariance=np.diag([0.04, 0.05, 0.001]),
+    ),
 )
 ONE_OF_EACH: tuple[Envelope[Event], ...] = tuple(
     Envelope(EventIdentity("van", "boot-1", sequence), 1_700_000_000_000_000_000 + sequence, event)

@@ -24,7 +24,7 @@ _sym_db = _symbol_database.Default()
 
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n$trigpoint_schemas/v1/corrected.proto\x12\x0ctrigpoint.v1\"\xc1\x01\n\x0e\x41nchorLabelled\x12\x0e\n\x06\x61nchor\x18\x01 \x01(\t\x12\x0f\n\x07lat_deg\x18\x02 \x01(\x01\x12\x0f\n\x07lon_deg\x18\x03 \x01(\x01\x12\x0f\n\x07sigma_m\x18\x04 \x01(\x01\x12\r\n\x05image\x18\x05 \x01(\t\x12\x15\n\rimage_sigma_m\x18\x06 \x01(\x01\x12\x0c\n\x04kind\x18\x07 \x01(\t\x12\x11\n\tsignature\x18\x08 \x01(\t\x12\x12\n\nsource_crs\x18\t \x01(\t\x12\x11\n\toperation\x18\n \x01(\tb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n$trigpoint_schemas/v1/corrected.proto\x12\x0ctrigpoint.v1\"\xc1\x01\n\x0e\x41nchorLabelled\x12\x0e\n\x06\x61nchor\x18\x01 \x01(\t\x12\x0f\n\x07lat_deg\x18\x02 \x01(\x01\x12\x0f\n\x07lon_deg\x18\x03 \x01(\x01\x12\x0f\n\x07sigma_m\x18\x04 \x01(\x01\x12\r\n\x05image\x18\x05 \x01(\t\x12\x15\n\rimage_sigma_m\x18\x06 \x01(\x01\x12\x0c\n\x04kind\x18\x07 \x01(\t\x12\x11\n\tsignature\x18\x08 \x01(\t\x12\x12\n\nsource_crs\x18\t \x01(\t\x12\x11\n\toperation\x18\n \x01(\t\"P\n\x0f\x41nchorRetracted\x12\x0e\n\x06\x61nchor\x18\x01 \x01(\t\x12\r\n\x05image\x18\x02 \x01(\t\x12\x0e\n\x06\x61uthor\x18\x03 \x01(\t\x12\x0e\n\x06reason\x18\x04 \x01(\t\"Q\n\rDriveExcluded\x12\x0f\n\x07vehicle\x18\x01 \x01(\t\x12\x0f\n\x07\x62oot_id\x18\x02 \x01(\t\x12\x0e\n\x06\x61uthor\x18\x03 \x01(\t\x12\x0e\n\x06reason\x18\x04 \x01(\t\"Q\n\rDriveIncluded\x12\x0f\n\x07vehicle\x18\x01 \x01(\t\x12\x0f\n\x07\x62oot_id\x18\x02 \x01(\t\x12\x0e\n\x06\x61uthor\x18\x03 \x01(\t\x12\x0e\n\x06reason\x18\x04 \x01(\tb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -33,4 +33,10 @@ if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_ANCHORLABELLED']._serialized_start=55
   _globals['_ANCHORLABELLED']._serialized_end=248
+  _globals['_ANCHORRETRACTED']._serialized_start=250
+  _globals['_ANCHORRETRACTED']._serialized_end=330
+  _globals['_DRIVEEXCLUDED']._serialized_start=332
+  _globals['_DRIVEEXCLUDED']._serialized_end=413
+  _globals['_DRIVEINCLUDED']._serialized_start=415
+  _globals['_DRIVEINCLUDED']._serialized_end=496
 # @@protoc_insertion_point(module_scope)

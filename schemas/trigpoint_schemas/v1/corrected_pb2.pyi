@@ -27,3 +27,39 @@ class AnchorLabelled(_message.Message):
     source_crs: str
     operation: str
     def __init__(self, anchor: _Optional[str] = ..., lat_deg: _Optional[float] = ..., lon_deg: _Optional[float] = ..., sigma_m: _Optional[float] = ..., image: _Optional[str] = ..., image_sigma_m: _Optional[float] = ..., kind: _Optional[str] = ..., signature: _Optional[str] = ..., source_crs: _Optional[str] = ..., operation: _Optional[str] = ...) -> None: ...
+
+class AnchorRetracted(_message.Message):
+    __slots__ = ("anchor", "image", "author", "reason")
+    ANCHOR_FIELD_NUMBER: _ClassVar[int]
+    IMAGE_FIELD_NUMBER: _ClassVar[int]
+    AUTHOR_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    anchor: str
+    image: str
+    author: str
+    reason: str
+    def __init__(self, anchor: _Optional[str] = ..., image: _Optional[str] = ..., author: _Optional[str] = ..., reason: _Optional[str] = ...) -> None: ...
+
+class DriveExcluded(_message.Message):
+    __slots__ = ("vehicle", "boot_id", "author", "reason")
+    VEHICLE_FIELD_NUMBER: _ClassVar[int]
+    BOOT_ID_FIELD_NUMBER: _ClassVar[int]
+    AUTHOR_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    vehicle: str
+    boot_id: str
+    author: str
+    reason: str
+    def __init__(self, vehicle: _Optional[str] = ..., boot_id: _Optional[str] = ..., author: _Optional[str] = ..., reason: _Optional[str] = ...) -> None: ...
+
+class DriveIncluded(_message.Message):
+    __slots__ = ("vehicle", "boot_id", "author", "reason")
+    VEHICLE_FIELD_NUMBER: _ClassVar[int]
+    BOOT_ID_FIELD_NUMBER: _ClassVar[int]
+    AUTHOR_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    vehicle: str
+    boot_id: str
+    author: str
+    reason: str
+    def __init__(self, vehicle: _Optional[str] = ..., boot_id: _Optional[str] = ..., author: _Optional[str] = ..., reason: _Optional[str] = ...) -> None: ...

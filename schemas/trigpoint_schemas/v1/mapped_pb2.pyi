@@ -15,7 +15,7 @@ class StreamCount(_message.Message):
     def __init__(self, stream: _Optional[str] = ..., count: _Optional[int] = ...) -> None: ...
 
 class MapSolved(_message.Message):
-    __slots__ = ("map_version", "method", "settings_json", "inputs", "landmark_count", "anchor_count", "wall_s")
+    __slots__ = ("map_version", "method", "settings_json", "inputs", "landmark_count", "anchor_count", "wall_s", "base_version", "removed")
     MAP_VERSION_FIELD_NUMBER: _ClassVar[int]
     METHOD_FIELD_NUMBER: _ClassVar[int]
     SETTINGS_JSON_FIELD_NUMBER: _ClassVar[int]
@@ -23,6 +23,8 @@ class MapSolved(_message.Message):
     LANDMARK_COUNT_FIELD_NUMBER: _ClassVar[int]
     ANCHOR_COUNT_FIELD_NUMBER: _ClassVar[int]
     WALL_S_FIELD_NUMBER: _ClassVar[int]
+    BASE_VERSION_FIELD_NUMBER: _ClassVar[int]
+    REMOVED_FIELD_NUMBER: _ClassVar[int]
     map_version: int
     method: str
     settings_json: str
@@ -30,7 +32,23 @@ class MapSolved(_message.Message):
     landmark_count: int
     anchor_count: int
     wall_s: float
-    def __init__(self, map_version: _Optional[int] = ..., method: _Optional[str] = ..., settings_json: _Optional[str] = ..., inputs: _Optional[_Iterable[_Union[StreamCount, _Mapping[str, object]]]] = ..., landmark_count: _Optional[int] = ..., anchor_count: _Optional[int] = ..., wall_s: _Optional[float] = ...) -> None: ...
+    base_version: int
+    removed: _containers.RepeatedScalarFieldContainer[str]
+    def __init__(self, map_version: _Optional[int] = ..., method: _Optional[str] = ..., settings_json: _Optional[str] = ..., inputs: _Optional[_Iterable[_Union[StreamCount, _Mapping[str, object]]]] = ..., landmark_count: _Optional[int] = ..., anchor_count: _Optional[int] = ..., wall_s: _Optional[float] = ..., base_version: _Optional[int] = ..., removed: _Optional[_Iterable[str]] = ...) -> None: ...
+
+class OdometryCorrected(_message.Message):
+    __slots__ = ("vehicle", "boot_id", "map_version", "T_map_odom", "covariance")
+    VEHICLE_FIELD_NUMBER: _ClassVar[int]
+    BOOT_ID_FIELD_NUMBER: _ClassVar[int]
+    MAP_VERSION_FIELD_NUMBER: _ClassVar[int]
+    T_MAP_ODOM_FIELD_NUMBER: _ClassVar[int]
+    COVARIANCE_FIELD_NUMBER: _ClassVar[int]
+    vehicle: str
+    boot_id: str
+    map_version: int
+    T_map_odom: _containers.RepeatedScalarFieldContainer[float]
+    covariance: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, vehicle: _Optional[str] = ..., boot_id: _Optional[str] = ..., map_version: _Optional[int] = ..., T_map_odom: _Optional[_Iterable[float]] = ..., covariance: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class CalibrationState(_message.Message):
     __slots__ = ("name", "value", "sigma")

@@ -16,7 +16,7 @@ from google.protobuf.message import DecodeError, Message
 from numpy.typing import NDArray
 
 from trigpoint.errors import EventRejected
-from trigpoint.events.corrected import AnchorLabelled, Corrected
+from trigpoint.events.corrected import AnchorLabelled, AnchorRetracted, Corrected, DriveExcluded, DriveIncluded
 from trigpoint.events.estimated import Estimated, FixJudged, GateAlarmed, PoseFiltered
 from trigpoint.events.mapped import (
     AnchorAssociated,
@@ -24,6 +24,7 @@ from trigpoint.events.mapped import (
     LandmarkSolved,
     Mapped,
     MapSolved,
+    OdometryCorrected,
     TrajectorySolved,
 )
 from trigpoint.events.observed import (
@@ -40,7 +41,7 @@ from trigpoint.events.observed import (
 )
 from trigpoint_schemas.v1 import corrected_pb2, estimated_pb2, mapped_pb2, observed_pb2
 
-Event = Observed | EventRefused | MapFramePinned | Corrected | Estimated | Mapped
+Event = Observed | EventRefused | MapFramePinned | Corrected | Estimated | Mapped | OdometryCorrected
 EventT = TypeVar("EventT")
 MessageT = TypeVar("MessageT", bound=Message)
 Floats = NDArray[np.float64]
@@ -182,6 +183,8 @@ def _map_message(event: MapSolved) -> mapped_pb2.MapSolved:
         landmark_count=event.landmark_count,
         anchor_count=event.anchor_count,
         wall_s=event.wall_s,
+        base_version=event.base_version,
+        removed=event.removed,
     )
 
 
@@ -194,6 +197,8 @@ def _map_event(message: mapped_pb2.MapSolved) -> MapSolved:
         landmark_count=message.landmark_count,
         anchor_count=message.anchor_count,
         wall_s=message.wall_s,
+        base_version=message.base_version,
+        removed=tuple(message.removed),
     )
 
 
@@ -299,6 +304,26 @@ def _offset_event(message: mapped_pb2.ImageOffsetSolved) -> ImageOffsetSolved:
     )
 
 
+def _odometry_message(event: OdometryCorrected) -> mapped_pb2.OdometryCorrected:
+    return mapped_pb2.OdometryCorrected(
+        vehicle=event.vehicle,
+        boot_id=event.boot_id,
+        map_version=event.map_version,
+        T_map_odom=_listed(event.T_map_odom, (3,)),
+        covariance=_listed(event.covariance, (3, 3)),
+    )
+
+
+def _odometry_event(message: mapped_pb2.OdometryCorrected) -> OdometryCorrected:
+    return OdometryCorrected(
+        vehicle=message.vehicle,
+        boot_id=message.boot_id,
+        map_version=message.map_version,
+        T_map_odom=_array(message.T_map_odom, (3,)),
+        covariance=_array(message.covariance, (3, 3)),
+    )
+
+
 _FORMS: tuple[_Form[Any, Any], ...] = (
     _flat(VehicleDescribed, observed_pb2.VehicleDescribed),
     replace(_flat(WheelSpeedMeasured, observed_pb2.WheelSpeedMeasured), event_of=_wheel_event),
@@ -309,6 +334,9 @@ _FORMS: tuple[_Form[Any, Any], ...] = (
     _flat(EventRefused, observed_pb2.EventRefused),
     _flat(MapFramePinned, observed_pb2.MapFramePinned),
     _flat(AnchorLabelled, corrected_pb2.AnchorLabelled),
+    _flat(AnchorRetracted, corrected_pb2.AnchorRetracted),
+    _flat(DriveExcluded, corrected_pb2.DriveExcluded),
+    _flat(DriveIncluded, corrected_pb2.DriveIncluded),
     _flat(FixJudged, estimated_pb2.FixJudged),
     _Form(PoseFiltered, estimated_pb2.PoseFiltered, _pose_message, _pose_event),
     _flat(GateAlarmed, estimated_pb2.GateAlarmed),
@@ -317,6 +345,7 @@ _FORMS: tuple[_Form[Any, Any], ...] = (
     _Form(LandmarkSolved, mapped_pb2.LandmarkSolved, _landmark_message, _landmark_event),
     _Form(AnchorAssociated, mapped_pb2.AnchorAssociated, _association_message, _association_event),
     _Form(ImageOffsetSolved, mapped_pb2.ImageOffsetSolved, _offset_message, _offset_event),
+    _Form(OdometryCorrected, mapped_pb2.OdometryCorrected, _odometry_message, _odometry_event),
 )
 _WRITING: Mapping[type, tuple[str, Callable[[Any], Message]]] = {
     form.event_class: (form.message_class.DESCRIPTOR.full_name, form.message_of) for form in _FORMS

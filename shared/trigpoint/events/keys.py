@@ -3,10 +3,17 @@
 from collections.abc import Mapping
 
 from trigpoint.errors import InputError
-from trigpoint.events.corrected import AnchorLabelled
+from trigpoint.events.corrected import AnchorLabelled, AnchorRetracted, DriveExcluded, DriveIncluded
 from trigpoint.events.envelope import Envelope
 from trigpoint.events.estimated import FixJudged, GateAlarmed, PoseFiltered
-from trigpoint.events.mapped import AnchorAssociated, ImageOffsetSolved, LandmarkSolved, MapSolved, TrajectorySolved
+from trigpoint.events.mapped import (
+    AnchorAssociated,
+    ImageOffsetSolved,
+    LandmarkSolved,
+    MapSolved,
+    OdometryCorrected,
+    TrajectorySolved,
+)
 from trigpoint.events.observed import (
     EventRefused,
     GnssFixReceived,
@@ -38,6 +45,9 @@ KEY_PATTERNS: Mapping[type, str] = {
     EventRefused: "refused",
     MapFramePinned: "map/{map}/frame",
     AnchorLabelled: "map/{map}/anchor",
+    AnchorRetracted: "map/{map}/anchor-retraction",
+    DriveExcluded: "map/{map}/drive-exclusion",
+    DriveIncluded: "map/{map}/drive-inclusion",
     FixJudged: "veh/{vehicle}/est/fix",
     PoseFiltered: "veh/{vehicle}/est/pose",
     GateAlarmed: "veh/{vehicle}/est/gate",
@@ -46,6 +56,7 @@ KEY_PATTERNS: Mapping[type, str] = {
     AnchorAssociated: "map/{map}/association",
     ImageOffsetSolved: "map/{map}/image-offset",
     MapSolved: "map/{map}/version",
+    OdometryCorrected: "veh/{vehicle}/corr/odometry",
 }
 
 STREAM_PATTERNS: Mapping[type, str] = {
@@ -58,6 +69,9 @@ STREAM_PATTERNS: Mapping[type, str] = {
     EventRefused: "refused",
     MapFramePinned: "map",
     AnchorLabelled: "corrections",
+    AnchorRetracted: "corrections",
+    DriveExcluded: "corrections",
+    DriveIncluded: "corrections",
     FixJudged: "filtering",
     PoseFiltered: "filtering",
     GateAlarmed: "filtering",
@@ -66,6 +80,7 @@ STREAM_PATTERNS: Mapping[type, str] = {
     AnchorAssociated: "optimisation",
     ImageOffsetSolved: "optimisation",
     MapSolved: "optimisation",
+    OdometryCorrected: "odometry",
 }
 
 
@@ -84,7 +99,7 @@ def valid_name(name: str) -> str:
 def vehicle_of(envelope: Envelope[object]) -> str:
     """The vehicle an event is about: the one it names, else its source."""
     event = envelope.event
-    if isinstance(event, FixJudged | PoseFiltered | GateAlarmed | TrajectorySolved):
+    if isinstance(event, FixJudged | PoseFiltered | GateAlarmed | TrajectorySolved | OdometryCorrected):
         return event.vehicle
     return envelope.identity.source
 

@@ -13,7 +13,9 @@ Ints = NDArray[np.int64]
 class MapSolved:
     """A map version was solved from the log up to `inputs` (stream, count) with `settings_json`.
 
-    Appended last: a version without it is not there.
+    Appended last: a version without it is not there. `base_version` 0: the version is whole in itself. Else only what
+    differs from that version stands in its events: a landmark, trajectory, anchor or image not among them is as it was
+    there, and the landmarks `removed` are in the map no more.
     """
 
     map_version: int
@@ -23,6 +25,8 @@ class MapSolved:
     landmark_count: int
     anchor_count: int
     wall_s: float
+    base_version: int = 0
+    removed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,6 +89,23 @@ class ImageOffsetSolved:
     image: str
     offset_m: Floats
     covariance_m2: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OdometryCorrected:
+    """Where a vehicle's own dead reckoning lies in the map, for the vehicle to place itself by.
+
+    T_map_odom (3,): x, y in m, heading in rad, of the odometry frame in the map frame: T_map_base = T_map_odom
+    composed with T_odom_base, the latter from the nominal dead reckoning of the boot since its first wheel message.
+    covariance (3, 3) of the base in the map frame at the event's stamp: x, y in m, heading in rad. `map_version` is the
+    newest one the correction agrees with.
+    """
+
+    vehicle: str
+    boot_id: str
+    map_version: int
+    T_map_odom: Floats
+    covariance: Floats
 
 
 Mapped = MapSolved | TrajectorySolved | LandmarkSolved | AnchorAssociated | ImageOffsetSolved

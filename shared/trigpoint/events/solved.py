@@ -59,7 +59,8 @@ class LabelReduction:
 
 
 def solved_maps(events: Iterable[Mapped]) -> tuple[SolvedMap, ...]:
-    """The complete map versions in a sequence of mapped events; parts without a head are left out."""
+    """The complete map versions in a sequence of mapped events, each whole; parts without a head are left out, and so
+    is a version whose base is not there."""
     parts: dict[int, list[Mapped]] = {}
     heads: dict[int, MapSolved] = {}
     for event in events:
@@ -67,7 +68,28 @@ def solved_maps(events: Iterable[Mapped]) -> tuple[SolvedMap, ...]:
             heads[event.map_version] = event
         else:
             parts.setdefault(event.map_version, []).append(event)
-    return tuple(_assembled(heads[version], parts.get(version, [])) for version in sorted(heads))
+    whole: dict[int, SolvedMap] = {}
+    for version in sorted(heads):
+        solved = _assembled(heads[version], parts.get(version, []))
+        if not solved.head.base_version:
+            whole[version] = solved
+        elif solved.head.base_version in whole:
+            whole[version] = _upon(whole[solved.head.base_version], solved)
+    return tuple(whole.values())
+
+
+def _upon(base: SolvedMap, change: SolvedMap) -> SolvedMap:
+    """A version that says only what differs from its base, made whole with what the base has."""
+    paths = {(one.vehicle, one.boot_id): one for one in (*base.trajectories, *change.trajectories)}
+    landmarks = {one.landmark: one for one in (*base.landmarks, *change.landmarks)}
+    removed = set(change.head.removed)
+    return SolvedMap(
+        head=change.head,
+        trajectories=tuple(paths.values()),
+        landmarks=tuple(one for name, one in landmarks.items() if name not in removed),
+        anchors=tuple({one.anchor: one for one in (*base.anchors, *change.anchors)}.values()),
+        images=tuple({one.image: one for one in (*base.images, *change.images)}.values()),
+    )
 
 
 def _assembled(head: MapSolved, parts: list[Mapped]) -> SolvedMap:
