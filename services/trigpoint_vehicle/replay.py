@@ -9,7 +9,7 @@ from itertools import chain
 from pathlib import Path
 
 from trigpoint.bus.ports import Bus, BusMessage, Subscription
-from trigpoint.errors import InputError, ServiceError
+from trigpoint.errors import InputError, LogDamaged, ServiceError
 from trigpoint.events.codec import encode, event_class
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.keys import DEFAULT_ROOT
@@ -126,7 +126,7 @@ def replay_log(
 ) -> ReplayReport:
     """Every whole message of a vehicle's log sent as it is, all of them acknowledged; `progress` hears of each one.
 
-    Raises LogDamaged, after the whole ones are sent, for a damaged file, InputError for one without a message,
+    Raises LogDamaged, after the whole ones are acknowledged, for a damaged file, InputError for one without a message,
     ServiceError if nobody listens or acknowledges.
     """
     chosen = settings if settings is not None else ReplaySettings()
@@ -159,10 +159,14 @@ def _replay(
     try:
         _await_listener(bus, first.key, settings.listener_timeout_s)
         under_way = _UnderWay(bus, acknowledgements, settings)
-        for message in chain((first,), messages):
-            under_way.send(message)
-            if progress is not None:
-                progress(1)
+        try:
+            for message in chain((first,), messages):
+                under_way.send(message)
+                if progress is not None:
+                    progress(1)
+        except LogDamaged:
+            under_way.finish()
+            raise
         under_way.finish()
     finally:
         acknowledgements.close()

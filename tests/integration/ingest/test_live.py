@@ -15,7 +15,7 @@ import pytest
 from trigpoint.bus.memory_bus import MemoryBus, MemoryExchange
 from trigpoint.bus.ports import Bus, BusMessage, Subscription
 from trigpoint.bus.zenoh_bus import ZenohBus, ZenohSettings
-from trigpoint.errors import AppendFailed, ServiceError
+from trigpoint.errors import AppendFailed, LogDamaged, ServiceError
 from trigpoint.events.envelope import Envelope, EventIdentity, LogPosition
 from trigpoint.events.keys import key_expression
 from trigpoint.events.observed import EventRefused, GnssFixReceived, Observed
@@ -131,6 +131,17 @@ def test_a_vehicle_log_is_replayed_as_it_is(
         report = replay_log(vehicle_log, buses[0])
     assert stored(log) == rows
     assert (report.vehicle, report.messages) == ("veh-a", len(rows))
+
+
+def test_the_whole_messages_of_a_damaged_log_are_all_in_before_the_damage_is_told(
+    vehicle_log: Path, rows: Rows, log: McapLog
+) -> None:
+    vehicle_log.write_bytes(vehicle_log.read_bytes()[:-20])  # the end of the footer
+    bus = MemoryBus()
+    with running(log, bus), pytest.raises(LogDamaged):
+        replay_log(vehicle_log, bus, settings=PATIENT)
+    assert stored(log) == rows
+    bus.close()
 
 
 def test_a_bad_live_message_is_refused_acknowledged_and_blocks_nothing(
