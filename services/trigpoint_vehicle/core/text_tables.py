@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 
@@ -89,7 +89,7 @@ class TextTable:
 
 
 def _exact_stamps_ns(texts: tuple[str, ...], unit_ns: int) -> Ints | None:
-    # plain decimals short enough for float64 to hold every digit; None for anything else
+    # plain decimals short enough for float64 to hold every digit, and for int64 as nanoseconds; None for anything else
     decimals = max((len(text) - 1 - text.find(".") for text in texts if "." in text), default=0)
     digits = max((len(text) for text in texts), default=0)
     if digits > EXACT_DIGITS or unit_ns % 10**decimals or not set("".join(texts)) <= PLAIN_CHARACTERS:
@@ -98,15 +98,19 @@ def _exact_stamps_ns(texts: tuple[str, ...], unit_ns: int) -> Ints | None:
         counts = np.rint(np.array(texts, dtype=np.str_).astype(np.float64) * 10.0**decimals)
     except ValueError:
         return None
-    stamps: Ints = counts.astype(np.int64) * (unit_ns // 10**decimals)
+    step_ns = unit_ns // 10**decimals
+    if np.abs(counts).max(initial=0.0) * step_ns > LIMITS_NS[1] // 2:
+        return None
+    stamps: Ints = counts.astype(np.int64) * step_ns
     return stamps
 
 
-def _split_rows(lines: Iterable[str], delimiter: str) -> Iterator[list[str]]:
+def _split_rows(numbered: Sequence[tuple[int, str]], delimiter: str) -> Iterator[tuple[int, list[str]]]:
+    """Cells of numbered lines, each row with the line it ends on: a cell in quotes may go over several."""
     if delimiter == WHITESPACE:
-        return (line.split() for line in lines)
-    rows = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
-    return ([cell.strip() for cell in row] for row in rows)
+        return ((number, line.split()) for number, line in numbered)
+    rows = csv.reader((line for _, line in numbered), delimiter=delimiter, skipinitialspace=True)
+    return ((numbered[rows.line_num - 1][0], [cell.strip() for cell in row]) for row in rows)
 
 
 def text_table(
@@ -114,14 +118,17 @@ def text_table(
 ) -> TextTable:
     """The table of a text; without `columns` its first row names them. Empty lines and comments are no rows.
 
-    Raises InputError where there is no header, a name twice, or a row of another length.
+    Raises InputError where there is no header, a name twice, a row of another length, or a cell too long.
     """
     lines = source.text.removeprefix("\ufeff").splitlines()
     numbered = [(number, line) for number, line in enumerate(lines, start=1) if line.strip()]
     if comment:
         numbered = [(number, line) for number, line in numbered if not line.lstrip().startswith(comment)]
-    rows = list(_split_rows((line for _, line in numbered), delimiter))
-    line_number = [number for number, _ in numbered]
+    try:
+        split = list(_split_rows(numbered, delimiter))
+    except csv.Error as error:
+        raise InputError(f"{source.name}: cannot be read as a table: {error}") from error
+    line_number, rows = [number for number, _ in split], [row for _, row in split]
     names = tuple(columns)
     if not names:
         names, rows, line_number = _headed(source.name, rows), rows[1:], line_number[1:]

@@ -70,11 +70,21 @@ def test_stamps_keep_every_digit(text: str, unit_ns: int, stamp_ns: int) -> None
     assert table.stamps_ns("t", unit_ns=unit_ns, epoch_ns=0).tolist() == [stamp_ns]
 
 
-@pytest.mark.parametrize("text", ["nan", "soon", "1e30"])
+@pytest.mark.parametrize("text", ["nan", "soon", "1e30", "1709510400000"])
 def test_a_cell_that_is_no_time_is_refused(text: str) -> None:
     table = text_table(SourceText("a.csv", f"t\n1\n{text}\n"))
     with pytest.raises(InputError, match=f"a.csv, row 3: t is '{text}'"):
         table.stamps_ns("t", unit_ns=1_000_000_000, epoch_ns=0)
+
+
+def test_a_cell_in_quotes_may_go_over_several_lines() -> None:
+    table = text_table(SourceText("a.csv", 't,name\n1,"big\npole"\n2,corner\n'))
+    assert (table.numbers("t").tolist(), table.line_number) == ([1.0, 2.0], (3, 4))
+
+
+def test_a_cell_too_long_to_be_one_is_refused() -> None:
+    with pytest.raises(InputError, match=r"a.csv: cannot be read as a table: field larger than field limit"):
+        text_table(SourceText("a.csv", "t,name\n1," + 200_000 * "x"))
 
 
 def test_columns_may_be_split_by_white_space_and_named_from_outside() -> None:
