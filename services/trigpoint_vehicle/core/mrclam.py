@@ -5,7 +5,6 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from trigpoint.errors import InputError
 from trigpoint.events.corrected import AnchorLabelled
 from trigpoint.events.observed import LandmarkDetection, VehicleDescribed, WheelSpeedMeasured
 from trigpoint.events.truth import Truth, TruthLandmark, TruthPath
@@ -74,10 +73,14 @@ def _stamps(table: TextTable) -> list[int]:
 
 
 def _whole(table: TextTable, column: str) -> list[int]:
+    return [_whole_number(table, column, row, text) for row, text in enumerate(table.texts(column))]
+
+
+def _whole_number(table: TextTable, column: str, row: int, text: str) -> int:
     try:
-        return [int(text) for text in table.texts(column)]
-    except ValueError as error:
-        raise InputError(f"{table.source}: {column}: {error}") from None
+        return int(text)
+    except ValueError:
+        raise table.refused(row, column, "not a whole number") from None
 
 
 def _subjects(source: SourceText, anchors: Iterable[AnchorLabelled]) -> _Subjects:

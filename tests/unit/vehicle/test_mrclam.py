@@ -85,8 +85,8 @@ def test_true_headings_are_those_of_the_local_frame() -> None:
     assert path.heading_rad == pytest.approx([2.2696, 2.2696], abs=1e-6)
 
 
-def test_a_barcode_that_is_no_number_is_refused_with_its_file() -> None:
-    with pytest.raises(InputError, match="m1: barcode: .*'six'"):
+def test_a_barcode_that_is_no_number_is_refused_with_file_row_and_value() -> None:
+    with pytest.raises(InputError, match="m1, row 1: barcode is 'six', not a whole number"):
         converted(replace(ROBOT_1, measurement=SourceText("m1", "1248444189.599 six 3.8 0.1\n")))
 
 
