@@ -54,11 +54,11 @@ def transaction(connection: Connection) -> Iterator[None]:
     connection.execute(text("BEGIN IMMEDIATE"))
     try:
         yield
+        connection.execute(text("COMMIT"))  # fails where a reader does not let go in time
     except BaseException:
         if driver_of(connection).in_transaction:  # a full disk makes SQLite roll back by itself
             connection.execute(text("ROLLBACK"))
         raise
-    connection.execute(text("COMMIT"))
 
 
 @contextmanager

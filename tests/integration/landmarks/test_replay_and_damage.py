@@ -200,6 +200,18 @@ def test_a_full_disk_leaves_the_versions_before_as_they_were(path: Path) -> None
     store.close()
 
 
+def test_a_version_a_reader_kept_waiting_too_long_is_taken_back(path: Path) -> None:
+    store, reader = GeoPackageStore(path), sqlite3.connect(path)
+    driver_of(store._connection).execute("PRAGMA busy_timeout = 0")
+    reader.executescript("BEGIN; SELECT * FROM landmarks")  # a transaction that goes on holds its read lock
+    with pytest.raises(ServiceError, match="database is locked"):
+        store.apply(change(3), checkpoint(99))
+    reader.close()
+    store.apply(change(3), checkpoint(99))
+    assert store.map_versions()[-1].map_version == 3
+    store.close()
+
+
 def test_a_folder_that_is_not_there_is_said_with_its_name(tmp_path: Path) -> None:
     with pytest.raises(ServiceError, match="nowhere.*unable to open database file"):
         GeoPackageStore(tmp_path / "nowhere" / "landmarks.gpkg")
