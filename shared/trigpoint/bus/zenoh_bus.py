@@ -67,13 +67,14 @@ class _Arrival:
 
 
 def _messages(arrival: _Arrival) -> list[BusMessage]:
-    """What arrived in one transmission; as one UNIDENTIFIED message whatever is not ours."""
+    """What arrived in one transmission, at least one; as one UNIDENTIFIED message whatever is not ours."""
     if not is_bundle(arrival.attachment):
         return [_message(arrival, arrival.attachment, arrival.payload)]
-    try:
-        return [_message(arrival, attachment, payload) for attachment, payload in decode_bundle(arrival.payload)]
-    except InputError:
-        return [_message(arrival, b"", arrival.payload)]
+    with contextlib.suppress(InputError):
+        bundled = [_message(arrival, attachment, payload) for attachment, payload in decode_bundle(arrival.payload)]
+        if bundled:  # nobody of ours sends an empty one
+            return bundled
+    return [_message(arrival, b"", arrival.payload)]
 
 
 def _message(arrival: _Arrival, attachment: bytes, payload: bytes) -> BusMessage:

@@ -199,7 +199,9 @@ def test_closing_a_bus_wakes_whoever_waits_on_it(pair: tuple[Bus, Bus]) -> None:
     assert time.monotonic() - started_s < SOON_S / 2  # it returned because of the close, not of the time
 
 
-def test_a_foreign_message_arrives_as_unidentified() -> None:
+@pytest.mark.parametrize("attachment", [None, b"\x02\x00\x00\x00\x00", b"\x02\xff\xff\xff\xff"])
+@pytest.mark.parametrize("payload", [b"hello", b""])
+def test_a_foreign_message_arrives_as_unidentified(payload: bytes, attachment: bytes | None) -> None:
     zenoh = pytest.importorskip("zenoh")
     endpoint = free_endpoint()
     with ZenohBus(ZenohSettings(listen=(endpoint,))) as bus:
@@ -210,7 +212,7 @@ def test_a_foreign_message_arrives_as_unidentified() -> None:
         with zenoh.open(config) as stranger, stranger.declare_publisher("t/a") as publisher:
             while not publisher.matching_status.matching:
                 time.sleep(0.001)
-            publisher.put(b"hello")
+            publisher.put(payload, attachment=attachment)
             received = subscription.receive(SOON_S)
     assert received is not None
-    assert (received.identity, received.payload) == (UNIDENTIFIED, b"hello")
+    assert (received.identity, received.payload) == (UNIDENTIFIED, payload)
