@@ -214,12 +214,17 @@ class McapScan:
             return "file does not end with a footer"
         footer = parsed(Footer, tail[FRAME.size : FOOTER_BYTES])
         start, said = footer.summary_start or footer_start, footer.summary_crc
+        if not len(MAGIC) + DATA_END_BYTES <= start <= footer_start:
+            return f"summary starts at {start}, its footer at {footer_start}"
         held = content.checksum(start, content.size_bytes - len(MAGIC) - 4)
         if said != held and (said or self._checksums_required):
             return f"summary has checksum {held:08x}, the footer says {said:08x}"
         if content.read(start - DATA_END_BYTES, start - 4) != FRAME.pack(Opcode.DATA_END, 4):
             return f"summary starts at {start}, no end of a data section stands before it"
-        self._learn(content.read(start, footer_start))
+        try:
+            self._learn(content.read(start, footer_start))
+        except LogDamaged as error:
+            return f"summary at {start}: {error}"
         self._channels_settled = bool(self.channels)
         return ""
 
