@@ -1,5 +1,6 @@
 """A vehicle's log: one MCAP file of observations, written whole and read by message, so that one can be refused."""
 
+import contextlib
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -46,7 +47,8 @@ def write_vehicle_log(path: Path, rows: Iterable[Envelope[Observed]], *, vehicle
     except OSError as error:
         raise AppendFailed(f"{path}: vehicle log not written: {error}") from error
     finally:
-        partial.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # there is none, or what is wrong with it was said already
+            partial.unlink()
     return count
 
 

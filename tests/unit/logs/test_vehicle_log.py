@@ -75,6 +75,12 @@ def test_a_folder_that_is_not_there_fails_the_write(tmp_path: Path) -> None:
         write_vehicle_log(tmp_path / "nowhere" / "van.mcap", [], vehicle="van")
 
 
+def test_a_folder_that_is_a_file_fails_the_write(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(AppendFailed, match="Not a directory"):
+        write_vehicle_log(tmp_path / "file" / "van.mcap", [], vehicle="van")
+
+
 def test_an_empty_file_is_damaged(tmp_path: Path) -> None:
     (tmp_path / "empty.mcap").touch()
     with pytest.raises(LogDamaged, match=r"empty\.mcap, byte 0: file of 0 bytes"):
@@ -144,6 +150,35 @@ def test_messages_of_another_writer_are_read_too(tmp_path: Path) -> None:
     assert list(read_vehicle_log(foreign)) == [
         RawMessage("/thing", "foreign.Thing", b"abc", EventIdentity("", "", 4), START_NS)
     ]
+
+
+def _foreign_log(path: Path, metadata: dict[str, str]) -> bytes:
+    """A file of one message by a writer that leaves the summary's checksum out."""
+    with path.open("wb") as file:
+        writer = Writer(file, use_chunking=False, enable_crcs=False)
+        writer.start()
+        channel = writer.register_channel("/thing", "protobuf", 0, metadata)
+        writer.add_message(channel, START_NS, b"abc", START_NS, 4)
+        writer.finish()  # type: ignore[no-untyped-call]
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize("summary_start", [3, 2**40, 2**64 - 1])
+def test_a_summary_outside_of_its_file_costs_no_message(tmp_path: Path, summary_start: int) -> None:
+    content = _foreign_log(tmp_path / "foreign.mcap", {})
+    footer_end = len(content) - 8 - 8 - 4  # magic, offsets' start and checksum behind the summary's start
+    (tmp_path / "foreign.mcap").write_bytes(
+        content[: footer_end - 8] + summary_start.to_bytes(8, "little") + content[footer_end:]
+    )
+    found, (damage,) = _read(tmp_path / "foreign.mcap")
+    assert (len(found), damage.lost_messages) == (1, 0)
+    assert f"summary starts at {summary_start}" in damage.reason
+
+
+def test_a_summary_that_cannot_be_read_is_named_and_not_raised(tmp_path: Path) -> None:
+    _foreign_log(tmp_path / "foreign.mcap", {"sequence_base": "soon"})
+    _, damages = _read(tmp_path / "foreign.mcap")
+    assert any("summary" in damage.reason and "sequence base" in damage.reason for damage in damages)
 
 
 def test_messages_outside_of_chunks_are_read_too(tmp_path: Path) -> None:
