@@ -1,12 +1,12 @@
 """Filtering at work on live messages: each drive followed as ingest publishes it, the log read where one is missing."""
 
 import logging
-import threading
-from types import TracebackType
-from typing import Self, cast
+from typing import cast
 
+from trigpoint.bus.event_messages import event_message
+from trigpoint.bus.listening import ListeningService
 from trigpoint.bus.ports import Bus, BusMessage
-from trigpoint.events.codec import Event, decode, encode
+from trigpoint.events.codec import Event, decode
 from trigpoint.events.envelope import Envelope
 from trigpoint.events.estimated import Estimated
 from trigpoint.events.keys import DEFAULT_ROOT, KEY_VERSION, STREAM_PATTERNS, key_of
@@ -18,14 +18,14 @@ from trigpoint_filtering.app import STREAM, said_of
 from trigpoint_filtering.core.follower import DriveFollower
 from trigpoint_filtering.settings import FilterSettings
 
-IDLE_S = 0.05  # how long the loop waits for a message before it appends what it has and looks at its stop signal
+IDLE_S = 0.05  # between two looks at an empty queue: what was estimated is appended at each
 BATCH = 256  # estimates appended at a time
 VEHICLE_STREAM = STREAM_PATTERNS[VehicleDescribed]
 
 logger = logging.getLogger(__name__)
 
 
-class LiveFiltering:
+class LiveFiltering(ListeningService):
     """Hears what vehicles measured; appends its estimates, then publishes them. Close it, or leave its `with`."""
 
     def __init__(
@@ -38,12 +38,7 @@ class LiveFiltering:
         self._followers: dict[tuple[str, str], DriveFollower] = {}
         self._expected: dict[tuple[str, str], int] = {}
         self._pending: list[Envelope[Estimated]] = []
-        self._subscription = bus.subscribe(f"{root}/{KEY_VERSION}/veh/*/obs/**")
-
-    def run(self, stop: threading.Event) -> None:
-        """Follows until told to stop. Raises AppendFailed when the log cannot be written."""
-        while not stop.is_set():
-            self.step(IDLE_S)
+        super().__init__(bus.subscribe(f"{root}/{KEY_VERSION}/veh/*/obs/**"), idle_s=IDLE_S)
 
     def step(self, timeout_s: float) -> bool:
         """One message taken, or none within the timeout (then False, and what was estimated is in the log)."""
@@ -100,11 +95,7 @@ class LiveFiltering:
         self._log.append(STREAM, rows)
         self._pending = []
         for row in rows:
-            name, payload = encode(row.event)
-            key = key_of(row, root=self._root)
-            self._bus.publish(
-                BusMessage(key=key, schema_name=name, payload=payload, identity=row.identity, stamp_ns=row.stamp_ns)
-            )
+            self._bus.publish(event_message(row, key=key_of(row, root=self._root)))
 
     def close(self) -> None:
         """Every drive followed to the end of what the log has of it; the subscription ended."""
@@ -113,14 +104,3 @@ class LiveFiltering:
             self.catch_up(drive)
             self._pending += self._unsaid(follower.finish())
         self.flush()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if error is None:
-            self.close()
-        else:
-            self._subscription.close()

@@ -1,11 +1,10 @@
 """Ingest at work: vehicles' live messages from the bus into the log, acknowledged once they are durable."""
 
 import logging
-import threading
 import time
-from types import TracebackType
-from typing import Self
+from collections.abc import Callable
 
+from trigpoint.bus.listening import ListeningService
 from trigpoint.bus.ports import Bus, BusMessage
 from trigpoint.errors import InputError
 from trigpoint.events.envelope import EventIdentity
@@ -22,35 +21,32 @@ IDLE_S = 0.005  # between two looks at an empty queue: waking for each message c
 logger = logging.getLogger(__name__)
 
 
-class IngestService:
+class IngestService(ListeningService):
     """Hears every vehicle on the bus: order restored, validated, appended in groups, published, acknowledged.
 
     Close it (or leave its `with`): what was admitted is then in the log.
     """
 
-    def __init__(self, log: EventLog, bus: Bus, settings: IngestSettings) -> None:
+    def __init__(
+        self, log: EventLog, bus: Bus, settings: IngestSettings, *, now_s: Callable[[], float] = time.monotonic
+    ) -> None:
         self._bus = bus
+        self._now_s = now_s
         self._settings = settings
         self._journal = Journal(log, bus, settings)
         self._orders: dict[Drive, SequenceOrder] = {}
         self._gap_since_s: dict[Drive, float] = {}
         self._to_acknowledge: set[Drive] = set()
-        self._flushed_s = time.monotonic()
+        self._flushed_s = now_s()
         self._lost = 0
-        self._subscription = bus.subscribe(uplink_expression(root=settings.root))
-
-    def run(self, stop: threading.Event) -> None:
-        """Ingests until told to stop. Raises AppendFailed when the log cannot be written: then it must stop."""
-        while not stop.is_set():
-            if not self.step(0.0):
-                stop.wait(IDLE_S)
+        super().__init__(bus.subscribe(uplink_expression(root=settings.root)), idle_s=IDLE_S)
 
     def step(self, timeout_s: float) -> bool:
         """One message taken, or none within the timeout (then False); what is due is flushed."""
         message = self._subscription.receive(timeout_s)
         if message is not None:
             self._take(message)
-        waited_s = time.monotonic() - self._flushed_s
+        waited_s = self._now_s() - self._flushed_s
         if self._journal.pending_count >= self._settings.batch_count or waited_s >= self._settings.batch_s:
             self.flush()
         return message is not None
@@ -61,13 +57,13 @@ class IngestService:
         if order is None:
             following = self._journal.admission.acknowledged(drive) + 1
             order = self._orders[drive] = SequenceOrder(next_sequence=following, capacity=self._settings.held_limit)
-        released = order.offer(message)
-        for next_in_order in released:
+        awaited = order.awaited
+        for next_in_order in order.offer(message):
             self._journal.take(next_in_order)
-        if released:
+        if order.awaited > awaited:
             self._gap_since_s.pop(drive, None)
         if order.held:
-            self._gap_since_s.setdefault(drive, time.monotonic())
+            self._gap_since_s.setdefault(drive, self._now_s())
         self._to_acknowledge.add(drive)
 
     def flush(self) -> None:
@@ -77,13 +73,17 @@ class IngestService:
         for drive in sorted(self._to_acknowledge):
             self._acknowledge(drive)
         self._to_acknowledge.clear()
-        self._flushed_s = time.monotonic()
-        if self._subscription.lost > self._lost:
-            logger.warning("%d messages lost to a full queue; vehicles send them again", self._subscription.lost)
-            self._lost = self._subscription.lost
+        self._flushed_s = self._now_s()
+        self._warn_of_losses()
+
+    def _warn_of_losses(self) -> None:
+        lost = self._subscription.lost + sum(order.overflowed for order in self._orders.values())
+        if lost > self._lost:
+            logger.warning("%d messages lost to a full queue; vehicles send them again", lost)
+            self._lost = lost
 
     def _give_up_old_gaps(self) -> None:
-        now_s = time.monotonic()
+        now_s = self._now_s()
         for drive, since_s in list(self._gap_since_s.items()):
             if now_s - since_s >= self._settings.gap_timeout_s:
                 released = self._orders[drive].give_up()
@@ -119,14 +119,3 @@ class IngestService:
         """The subscription ended; what was admitted is in the log."""
         self._subscription.close()
         self.flush()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if error is None:
-            self.close()
-        else:
-            self._subscription.close()

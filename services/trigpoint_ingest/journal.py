@@ -3,9 +3,10 @@
 import logging
 from collections.abc import Sequence
 
-from trigpoint.bus.ports import Bus, BusMessage
+from trigpoint.bus.event_messages import event_message
+from trigpoint.bus.ports import Bus
 from trigpoint.errors import EventRejected, FrameRefused
-from trigpoint.events.codec import Event, encode
+from trigpoint.events.codec import Event
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.keys import STREAM_PATTERNS, key_of, stream_of
 from trigpoint.events.observed import EventRefused, MapFramePinned, VehicleDescribed
@@ -108,14 +109,7 @@ class Journal:
                 key = key_of_kind[kind] = key_of(envelope, root=self._settings.root, map_name=self._settings.map_name)
                 heard[key] = bus.has_listener(key)
             if heard[key]:
-                bus.publish(_bus_message(key, envelope))
-
-
-def _bus_message(key: str, envelope: Envelope[Event]) -> BusMessage:
-    name, payload = encode(envelope.event)
-    return BusMessage(
-        key=key, schema_name=name, payload=payload, identity=envelope.identity, stamp_ns=envelope.stamp_ns
-    )
+                bus.publish(event_message(envelope, key=key))
 
 
 def pinned_frame(log: EventLog) -> MapFramePinned | None:

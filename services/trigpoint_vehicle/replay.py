@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
+from trigpoint.bus.event_messages import event_message
 from trigpoint.bus.ports import Bus, BusMessage, Subscription
 from trigpoint.errors import InputError, LogDamaged, ServiceError
-from trigpoint.events.codec import encode, event_class
+from trigpoint.events.codec import event_class
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.keys import DEFAULT_ROOT
 from trigpoint.events.observed import Observed
@@ -186,14 +187,7 @@ def _recorded(messages: Iterable[RawMessage], root: str) -> Iterator[BusMessage]
 
 def _encoded(rows: Iterable[Envelope[Observed]], root: str) -> Iterator[BusMessage]:
     for envelope in rows:
-        schema_name, payload = encode(envelope.event)
-        yield BusMessage(
-            key=uplink_key(envelope.identity.source, type(envelope.event), root=root),
-            schema_name=schema_name,
-            payload=payload,
-            identity=envelope.identity,
-            stamp_ns=envelope.stamp_ns,
-        )
+        yield event_message(envelope, key=uplink_key(envelope.identity.source, type(envelope.event), root=root))
 
 
 def _await_listener(bus: Bus, key: str, timeout_s: float) -> None:

@@ -52,6 +52,11 @@ class SequenceOrder:
         self.overflowed = 0
 
     @property
+    def awaited(self) -> int:
+        """The number of the message that may go on next."""
+        return self._next
+
+    @property
     def held(self) -> int:
         """How many messages wait for an earlier one."""
         return len(self._held)

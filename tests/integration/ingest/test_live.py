@@ -255,6 +255,29 @@ def test_a_gap_is_given_up_after_a_while_and_what_waited_goes_in(rows: Rows) -> 
     bus.close()
 
 
+def test_old_messages_sent_again_do_not_prolong_the_wait_for_a_missing_one(rows: Rows) -> None:
+    clock = iter(range(1000))  # a second from one look to the next
+    bus, log = MemoryBus(), MemoryLog()
+    service = IngestService(log, bus, replace(SETTINGS, gap_timeout_s=30.0), now_s=lambda: float(next(clock)))
+    for row in (*rows[:5], *rows[6:10], *rows[:5] * 20):
+        bus.publish(live(row))
+    drain(service)
+    assert stored(log) == [*rows[:5], *rows[6:10]]
+    bus.close()
+
+
+def test_messages_that_find_no_room_behind_a_missing_one_are_told_of(
+    rows: Rows, caplog: pytest.LogCaptureFixture
+) -> None:
+    bus = MemoryBus()
+    with IngestService(MemoryLog(), bus, replace(SETTINGS, held_limit=2)) as service:
+        for row in (rows[0], *rows[2:7]):
+            bus.publish(live(row))
+        drain(service)
+    assert "3 messages lost to a full queue" in caplog.text
+    bus.close()
+
+
 def test_a_message_of_no_one_is_kept_aside(rows: Rows) -> None:
     bus = MemoryBus()
     log = MemoryLog()

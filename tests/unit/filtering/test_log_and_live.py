@@ -1,12 +1,14 @@
 """The service on a log and on live messages: the same estimates either way, each appended once."""
 
 import math
+import threading
 from collections.abc import Sequence
 
 import pytest
 
 from driven_paths.examples import FRAME, START_NS, Course, driven
-from trigpoint.bus.memory_bus import MemoryBus, MemoryExchange
+from trigpoint.bus.event_messages import event_message
+from trigpoint.bus.memory_bus import MemoryBus, MemoryExchange, MemorySubscription
 from trigpoint.bus.ports import BusMessage
 from trigpoint.events.codec import Event, decode, encode
 from trigpoint.events.drives import Drive
@@ -58,8 +60,7 @@ def said(log: MemoryLog) -> list[tuple[EventIdentity, int, bytes]]:
 
 
 def message_of(row: Envelope[Event]) -> BusMessage:
-    name, payload = encode(row.event)
-    return BusMessage(key=key_of(row), schema_name=name, payload=payload, identity=row.identity, stamp_ns=row.stamp_ns)
+    return event_message(row, key=key_of(row))
 
 
 def heard_live(log: MemoryLog, rows: Sequence[Envelope[Event]], heard: Sequence[Envelope[Event]]) -> None:
@@ -147,6 +148,34 @@ def test_a_restarted_service_says_nothing_twice() -> None:
     heard_live(live, [], rows[:600])
     heard_live(live, [], rows[600:])
     assert said(live) == said(whole)
+
+
+class SteadyBus(MemoryBus):
+    """A bus on which the next message is there for whoever waits, in bursts of ten for whoever only looks."""
+
+    def __init__(self, rows: Sequence[Envelope[Event]], stop: threading.Event) -> None:
+        super().__init__()
+        self._rows, self._stop, self._taken = list(rows), stop, 0
+
+    def subscribe(self, key_expression: str) -> MemorySubscription:
+        subscription = super().subscribe(key_expression)
+        subscription.receive = self._next  # type: ignore[method-assign]
+        return subscription
+
+    def _next(self, timeout_s: float) -> BusMessage | None:
+        self._taken += 1
+        if timeout_s == 0.0 and self._taken % 10 == 0:
+            return None
+        if len(self._rows) == 1:
+            self._stop.set()
+        return message_of(self._rows.pop(0))
+
+
+def test_estimates_are_in_the_log_while_messages_never_cease() -> None:
+    rows = rows_of(driven(COURSE).drive)[:200]
+    log, stop = pinned_log(rows), threading.Event()
+    LiveFiltering(log, SteadyBus(rows, stop)).run(stop)
+    assert said(log)
 
 
 def test_estimates_are_published_once_they_are_in_the_log() -> None:
