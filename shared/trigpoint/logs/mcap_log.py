@@ -13,8 +13,8 @@ from mcap.records import Chunk
 from trigpoint.errors import LogDamaged
 from trigpoint.events.codec import Event, decode, event_class
 from trigpoint.events.envelope import Envelope, LogPosition
-from trigpoint.events.keys import DEFAULT_MAP
-from trigpoint.events.observed import MapFramePinned
+from trigpoint.events.keys import DEFAULT_MAP, STREAM_PATTERNS
+from trigpoint.events.observed import MapFramePinned, VehicleDescribed
 from trigpoint.logs.catalog import NAME, Catalog, CatalogChunk, FileContents
 from trigpoint.logs.channels import ChannelKey, PackedRow, packed
 from trigpoint.logs.chunks import FRAME, messages, parsed, unpacked
@@ -75,7 +75,11 @@ class McapLog:
         self._catalog = Catalog(directory / NAME)
         self._writers: dict[str, StreamWriter] = {}
         self._lock = threading.RLock()
-        self._bring_all_up_to_date()
+        try:
+            self._bring_all_up_to_date()
+        except BaseException:
+            self._catalog.close()
+            raise
 
     def describe(self, frame: MapFramePinned) -> None:
         """Files begun from now on name the map's frame in their metadata."""
@@ -110,7 +114,8 @@ class McapLog:
 
     def _metadata(self, stream: str, vehicle: str) -> dict[str, dict[str, str]]:
         records = {"software": {"name": self._software}, "map": self._map}
-        return records | ({"vehicle": {"name": vehicle}} if vehicle and stream.endswith(vehicle) else {})
+        own = STREAM_PATTERNS[VehicleDescribed].format(vehicle=vehicle)
+        return records | ({"vehicle": {"name": vehicle}} if stream == own else {})
 
     def read(
         self,

@@ -1,5 +1,6 @@
 """The one writer of a stream: holds its lock, appends durably, begins a new file where one is long enough."""
 
+import contextlib
 import fcntl
 import os
 import sqlite3
@@ -7,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from io import FileIO
 from pathlib import Path
-from typing import BinaryIO
 
 from trigpoint.errors import AppendFailed
 from trigpoint.logs.catalog import Catalog, CatalogChunk, CatalogEntry, CatalogFile
@@ -57,16 +57,17 @@ class StreamWriter:
         try:
             bring_up_to_date(catalog, folder, folder.name)
             mend(catalog, folder, folder.name)
-        except OSError as error:
+            self.next_number = catalog.next_number(folder.name)
+        except (OSError, sqlite3.Error) as error:
             self._lock.close()
             raise AppendFailed(f"stream {folder.name}: not mended: {error}") from error
         except BaseException:
             self._lock.close()
             raise
-        self.next_number = catalog.next_number(folder.name)
 
     def append(self, rows: Sequence[PackedRow], metadata: Mapping[str, Mapping[str, str]]) -> None:
-        """The rows durable. Raises AppendFailed; nothing of them counts as appended then, and the stream is let go."""
+        """The rows durable. Raises AppendFailed and lets the stream go; nothing of them counts as appended then,
+        unless it was only the end of a full file that could not be written."""
         number = self.next_number
         try:
             target = self._open_file or self._begin(rows[0], metadata)
@@ -134,28 +135,30 @@ class StreamWriter:
         """After a failure: what is not durable cut off, as far as the disk lets us, and the stream let go."""
         target, self._open_file = self._open_file, None
         if target and not target.file.closed:
-            os.ftruncate(target.file.fileno(), target.durable_bytes)
-            target.file.close()
+            with contextlib.suppress(OSError), target.file:
+                os.ftruncate(target.file.fileno(), target.durable_bytes)
         self._lock.close()
 
 
-def _locked(folder: Path) -> BinaryIO:
-    """The stream's lock, held until closed. Raises AppendFailed if another writer holds it."""
+def _locked(folder: Path) -> FileIO:
+    """The stream's lock, held until closed. Raises AppendFailed if another writer holds it or it cannot be taken."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        lock = (folder / LOCK_NAME).open("a+b")
+        lock = (folder / LOCK_NAME).open("a+b", buffering=0)
     except OSError as error:
         raise AppendFailed(f"stream {folder.name}: {error}") from error
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
+        lock.truncate(0)
+        lock.write(str(os.getpid()).encode())
+    except BlockingIOError as error:
         lock.seek(0)
         holder = lock.read().decode("ascii", "replace") or "unknown"
         lock.close()
         raise AppendFailed(f"stream {folder.name} has a writer already, process {holder}: one at a time") from error
-    lock.truncate(0)
-    lock.write(str(os.getpid()).encode())
-    lock.flush()
+    except OSError as error:
+        lock.close()
+        raise AppendFailed(f"stream {folder.name}: not locked: {error}") from error
     return lock
 
 

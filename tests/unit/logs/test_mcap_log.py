@@ -1,8 +1,10 @@
+import os
 import resource
 import shutil
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,8 +14,9 @@ from mcap.reader import make_reader
 
 from event_examples.one_each import ONE_OF_EACH
 from event_examples.rows import START_NS, STEP_NS, fix_row, imu_row, imu_rows
-from trigpoint.errors import AppendFailed, LogDamaged
+from trigpoint.errors import AppendFailed, InputError, LogDamaged
 from trigpoint.events.envelope import Envelope, EventIdentity, LogPosition
+from trigpoint.events.estimated import FixJudged
 from trigpoint.events.observed import GnssFixReceived, MapFramePinned
 from trigpoint.logs.mcap_log import McapLog
 from trigpoint.logs.stream_writer import Rotation
@@ -244,6 +247,45 @@ def test_after_a_full_disk_all_that_was_acknowledged_is_there_and_writing_goes_o
     assert _sequences(log) == list(range(10))
     assert log.append(STREAM, imu_rows(10, 12)) == LogPosition(STREAM, 11)
     assert _sequences(log) == list(range(12))
+
+
+def test_a_lock_that_cannot_be_written_fails_the_append_and_is_let_go(log: McapLog) -> None:
+    with _largest_file(0), pytest.raises(AppendFailed, match="stream veh-van: not locked: .*File too large"):
+        log.append(STREAM, imu_rows(0, 1))
+    assert log.append(STREAM, imu_rows(0, 1)) == LogPosition(STREAM, 0)
+
+
+def test_a_catalog_that_cannot_be_asked_fails_the_append_and_lets_the_stream_go(log: McapLog) -> None:
+    log._catalog.close()
+    with pytest.raises(AppendFailed, match="stream veh-van: not mended: .*closed database"):
+        log.append(STREAM, imu_rows(0, 1))
+    with closing(McapLog(log.directory)) as other:
+        assert other.append(STREAM, imu_rows(0, 1)) == LogPosition(STREAM, 0)
+
+
+def test_a_file_that_cannot_even_be_cut_lets_its_stream_go(log: McapLog) -> None:
+    log.append(STREAM, imu_rows(0, 10))
+    target = log._writers[STREAM]._open_file
+    assert target is not None
+    os.close(target.file.fileno())
+    with pytest.raises(AppendFailed, match="stream veh-van, number 10: .*Bad file descriptor"):
+        log.append(STREAM, imu_rows(10, 20))
+    assert log.append(STREAM, imu_rows(10, 12)) == LogPosition(STREAM, 11)
+
+
+def test_a_file_of_several_vehicles_names_none(log: McapLog) -> None:
+    (verdict,) = (replace(row.event, vehicle="ing") for row in ONE_OF_EACH if isinstance(row.event, FixJudged))
+    log.append("filtering", [Envelope(EventIdentity("filtering", "boot-1", 0), START_NS, verdict)])
+    log.close()
+    with next((log.directory / "filtering").glob("*.mcap")).open("rb") as file:
+        assert {record.name for record in make_reader(file).iter_metadata()} == {"software", "map"}
+
+
+def test_a_folder_no_stream_can_have_is_refused_and_nothing_left_open(tmp_path: Path) -> None:
+    (tmp_path / "\a").mkdir()
+    with pytest.raises(InputError, match="that print"):
+        McapLog(tmp_path)
+    assert not (tmp_path / "catalog.sqlite-wal").exists()  # SQLite takes it away with the last connection
 
 
 def test_a_stream_whose_folder_is_gone_is_gone(log: McapLog) -> None:
