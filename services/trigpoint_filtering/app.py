@@ -1,7 +1,7 @@
 """Filtering at work on a log: every drive in it filtered, what was not yet said of it appended."""
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import cast
 
@@ -13,7 +13,6 @@ from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.observed import (
     GnssFixReceived,
     ImuMeasured,
-    MapFramePinned,
     Observed,
     VehicleDescribed,
     WheelPairMeasured,
@@ -21,17 +20,13 @@ from trigpoint.events.observed import (
 )
 from trigpoint.geodesy.projection import MapFrame
 from trigpoint.logs.ports import EventLog
-from trigpoint.logs.readings import pinned_frame
+from trigpoint.logs.readings import FRAME_STREAM, Progress, pinned_frame, vehicle_streams
 from trigpoint_filtering.core.publication import UNSAID, Published, Said, output_boot_id, published
 from trigpoint_filtering.core.track import begun_track, tracks
 from trigpoint_filtering.settings import FilterSettings
 
 STREAM = STREAM_PATTERNS[FixJudged]
-FRAME_STREAM = STREAM_PATTERNS[MapFramePinned]
-VEHICLE_STREAM_PREFIX = STREAM_PATTERNS[VehicleDescribed].partition("{")[0]
 KINDS = (VehicleDescribed, WheelSpeedMeasured, WheelPairMeasured, ImuMeasured, GnssFixReceived)
-
-Progress = Callable[[int, int], None]
 
 logger = logging.getLogger(__name__)
 
@@ -68,10 +63,8 @@ def filter_log(
 
 def logged_drives(log: EventLog) -> Iterator[Drive]:
     """The drives in the log, one vehicle's after the other's, without their landmark detections."""
-    for stream in log.streams():
-        if stream.startswith(VEHICLE_STREAM_PREFIX):
-            rows = (cast(Envelope[Observed], logged.envelope) for logged in log.read(stream, kinds=KINDS))
-            yield from drives_of(rows)
+    for stream in vehicle_streams(log):
+        yield from drives_of(cast(Envelope[Observed], logged.envelope) for logged in log.read(stream, kinds=KINDS))
 
 
 def said_of(log: EventLog) -> dict[str, Said]:

@@ -10,9 +10,9 @@ from trigpoint.events.corrected import AnchorLabelled, anchors_in_force
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.observed import EventRefused, MapFramePinned
-from trigpoint.geodesy.positions import GridPosition
-from trigpoint.geodesy.projection import MapFrame, pin_map_frame
+from trigpoint.geodesy.projection import MapFrame
 from trigpoint.logs.ports import EventLog
+from trigpoint.logs.readings import logged_frame, pinned_frame
 from trigpoint_ingest.core.anchors import (
     ANCHOR_SOURCE,
     LabelledAnchors,
@@ -23,7 +23,7 @@ from trigpoint_ingest.core.anchors import (
 )
 from trigpoint_ingest.core.framing import frame_pinned_by
 from trigpoint_ingest.core.refusal import REFUSING_SOURCE, SEPARATOR
-from trigpoint_ingest.journal import FRAME_IDENTITY, MAP_STREAM, REFUSED_STREAM, pinned_frame
+from trigpoint_ingest.journal import FRAME_IDENTITY, MAP_STREAM, REFUSED_STREAM
 
 CORRECTIONS_STREAM = STREAM_PATTERNS[AnchorLabelled]
 
@@ -71,11 +71,9 @@ def _logged(log: EventLog) -> list[AnchorLabelled]:
 
 def _frame(anchors: Sequence[AnchorLabelled], log: EventLog, stamp_ns: int) -> MapFrame:
     """The map's frame as pinned, or pinned now by the anchor in the middle of these."""
-    pinned = pinned_frame(log)
-    if pinned is None:
-        pinned = _pinned_by(middle_of(anchors))
-        log.append(MAP_STREAM, [Envelope(FRAME_IDENTITY, stamp_ns, pinned)])
-    return pin_map_frame(crs=pinned.crs, origin=GridPosition(pinned.origin_easting_m, pinned.origin_northing_m))
+    if pinned_frame(log) is None:
+        log.append(MAP_STREAM, [Envelope(FRAME_IDENTITY, stamp_ns, _pinned_by(middle_of(anchors)))])
+    return logged_frame(log)
 
 
 def _pinned_by(anchor: AnchorLabelled) -> MapFramePinned:

@@ -9,8 +9,9 @@ from trigpoint.errors import EventRejected, FrameRefused
 from trigpoint.events.codec import Event
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.keys import STREAM_PATTERNS, key_of, stream_of
-from trigpoint.events.observed import EventRefused, MapFramePinned, VehicleDescribed
+from trigpoint.events.observed import EventRefused, MapFramePinned
 from trigpoint.logs.ports import EventLog
+from trigpoint.logs.readings import pinned_frame, vehicle_streams
 from trigpoint_ingest.core.admission import Admission
 from trigpoint_ingest.core.framing import frame_pinned_by
 from trigpoint_ingest.core.messages import RawMessage
@@ -20,7 +21,6 @@ from trigpoint_ingest.settings import IngestSettings
 
 MAP_STREAM = STREAM_PATTERNS[MapFramePinned]
 REFUSED_STREAM = STREAM_PATTERNS[EventRefused]
-VEHICLE_STREAM_PREFIX = STREAM_PATTERNS[VehicleDescribed].partition("{")[0]
 FRAME_IDENTITY = EventIdentity("ingest", "map-frame", 0)
 
 logger = logging.getLogger(__name__)
@@ -112,21 +112,12 @@ class Journal:
                 bus.publish(event_message(envelope, key=key))
 
 
-def pinned_frame(log: EventLog) -> MapFramePinned | None:
-    """The map's frame as the log has it, None where nothing has pinned it yet."""
-    for row in log.read(MAP_STREAM, kinds=(MapFramePinned,)):
-        if isinstance(row.envelope.event, MapFramePinned):
-            return row.envelope.event
-    return None
-
-
 def admission_from(log: EventLog, settings: IngestSettings) -> Admission:
     """The memory of what the log holds: identities, descriptions and times of vehicles, and refusals."""
     admission = Admission(fleet=settings.fleet, limits=settings.stamps)
-    for stream in log.streams():
-        if stream.startswith(VEHICLE_STREAM_PREFIX):
-            for row in log.read(stream):
-                admission.recall(row.envelope)  # type: ignore[arg-type]  # only observations are in this stream
+    for stream in vehicle_streams(log):
+        for row in log.read(stream):
+            admission.recall(row.envelope)  # type: ignore[arg-type]  # only observations are in this stream
     for row in log.read(REFUSED_STREAM):
         if isinstance(row.envelope.event, EventRefused):
             admission.refuse(refused_identity(row.envelope))  # type: ignore[arg-type]

@@ -1,33 +1,28 @@
 """Takes the log's map versions into the landmark database, and holds the two against one another."""
 
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
-from trigpoint.errors import InputError
 from trigpoint.events.corrected import AnchorLabelled
 from trigpoint.events.envelope import Envelope, LogPosition
 from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.mapped import Mapped, MapSolved
-from trigpoint.events.observed import MapFramePinned
-from trigpoint.geodesy.positions import GridPosition
-from trigpoint.geodesy.projection import MapFrame, pin_map_frame
+from trigpoint.geodesy.projection import MapFrame
 from trigpoint.landmarks.geopackage_store import GeoPackageStore
 from trigpoint.landmarks.ports import LandmarkStore
 from trigpoint.landmarks.queries import LandmarkQuery
 from trigpoint.logs.ports import EventLog
+from trigpoint.logs.readings import Progress, in_silence, logged_frame
 from trigpoint_landmarks.core.comparison import RowDifference, checkpoint_differences, differences
 from trigpoint_landmarks.core.rows import labels_within, map_change, valid_after
 from trigpoint_landmarks.core.versions import Logged, refusal_of, solved_versions
 from trigpoint_landmarks.settings import DATABASE_NAME
 
 MAP_STREAM = STREAM_PATTERNS[MapSolved]
-FRAME_STREAM = STREAM_PATTERNS[MapFramePinned]
 LABEL_STREAM = STREAM_PATTERNS[AnchorLabelled]
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,10 +33,6 @@ class ProjectionReport:
     refused: tuple[tuple[int, str], ...]
     map_version: int | None
     landmark_count: int
-
-
-def in_silence(done: int, total: int) -> None:
-    """Progress for nobody."""
 
 
 def project(log: EventLog, store: LandmarkStore, *, progress: Progress = in_silence) -> ProjectionReport:
@@ -61,7 +52,7 @@ def project(log: EventLog, store: LandmarkStore, *, progress: Progress = in_sile
         if reason:
             refused.append((version.solved.map_version, reason))
             continue
-        frame = frame or _pinned_frame(log)
+        frame = frame or logged_frame(log)
         labels = labels_within(labelled, version.solved.inputs)
         change = map_change(version, frame=frame, labels=labels, valid=valid)
         store.apply(change, store.checkpoint().after(version.position))
@@ -107,12 +98,3 @@ def _labels(log: EventLog) -> Iterator[tuple[LogPosition, AnchorLabelled]]:
     for logged in log.read(LABEL_STREAM, kinds=(AnchorLabelled,)):
         if isinstance(logged.envelope.event, AnchorLabelled):
             yield logged.position, logged.envelope.event
-
-
-def _pinned_frame(log: EventLog) -> MapFrame:
-    """The frame of the map: the first one pinned, which is pinned for good."""
-    for logged in log.read(FRAME_STREAM, kinds=(MapFramePinned,)):
-        event = logged.envelope.event
-        if isinstance(event, MapFramePinned):
-            return pin_map_frame(crs=event.crs, origin=GridPosition(event.origin_easting_m, event.origin_northing_m))
-    raise InputError(f"the log has map versions in stream {MAP_STREAM!r}, but no frame in stream {FRAME_STREAM!r}")

@@ -83,7 +83,7 @@ def test_anchors_stand_where_they_were_labelled_when_the_map_was_solved(log: Mem
 def test_map_versions_without_a_pinned_frame_are_refused() -> None:
     log = MemoryLog()
     append_mapped(log, solved_map(1, [solved_landmark("L1", 0.0, 0.0)]))
-    with pytest.raises(InputError, match="no frame in stream 'map'"):
+    with pytest.raises(InputError, match="the log pins no map frame"):
         project(log, MemoryStore())
 
 
