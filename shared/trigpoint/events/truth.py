@@ -9,8 +9,9 @@ The text form is CSV with the columns `kind,name,stamp_ns,lat_deg,lon_deg,headin
 """
 
 import csv
+import io
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -107,10 +108,16 @@ def _columns(*columns: Ints | Floats) -> Iterator[tuple[float, ...]]:
 
 def truth_lines(truth: Truth) -> Iterator[str]:
     """The truth as CSV lines with their line ends, 11 decimals of a degree (about a micrometre)."""
-    yield ",".join(COLUMNS) + "\n"
+    yield _line(COLUMNS)
     for row in _rows_of(truth):
-        position = f"{row.lat_deg:.11f},{row.lon_deg:.11f},{row.heading_rad:.9f}"
-        yield f"{row.kind},{row.name},{row.stamp_ns},{position},{row.signature}\n"
+        position = f"{row.lat_deg:.11f}", f"{row.lon_deg:.11f}", f"{row.heading_rad:.9f}"
+        yield _line((row.kind, row.name, str(row.stamp_ns), *position, row.signature))
+
+
+def _line(cells: Sequence[str]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow(cells)
+    return text.getvalue()
 
 
 def _parsed_row(line_number: int, cells: list[str]) -> _Row:
@@ -160,7 +167,7 @@ def truth_from_lines(lines: Iterable[str]) -> Truth:
     header = next(cells, [])
     if tuple(header) != COLUMNS:
         raise InputError(f"truth, line 1: the columns are {','.join(header)!r}, expected {','.join(COLUMNS)!r}")
-    rows = [_parsed_row(number, row) for number, row in enumerate(cells, start=2)]
+    rows = [_parsed_row(cells.line_num, row) for row in cells]
     return Truth(
         paths=tuple(_path(name, group) for name, group in _by_name(rows, "pose").items()),
         fixes=tuple(_fixes(name, group) for name, group in _by_name(rows, "fix").items()),

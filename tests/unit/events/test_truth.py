@@ -50,6 +50,18 @@ def test_truth_comes_back_from_its_lines() -> None:
     assert math.isnan(again.paths[0].heading_rad[1])
 
 
+@pytest.mark.parametrize("name", ["pole, big", 'the "old" one', "two\nlines"])
+def test_a_name_that_csv_must_quote_comes_back(name: str) -> None:
+    truth = Truth(landmarks=(TruthLandmark(landmark=name, lat_deg=-33.5, lon_deg=151.5, signature=name),))
+    lines = "".join(truth_lines(truth)).splitlines(keepends=True)
+    assert truth_from_lines(lines).landmarks == truth.landmarks
+
+
+def test_a_broken_line_after_a_name_of_two_lines_is_refused_with_its_number() -> None:
+    with pytest.raises(InputError, match="truth, line 4"):
+        truth_from_lines([HEADER, '"pose","two\n', 'lines",1,2,3,4,\n', "pose,car,1,2\n"])
+
+
 def test_a_path_is_sorted_by_time() -> None:
     lines = [HEADER, "pose,car,20,1,2,0,\n", "pose,car,10,3,4,0,\n"]
     assert truth_from_lines(lines).paths[0].stamp_ns.tolist() == [10, 20]
