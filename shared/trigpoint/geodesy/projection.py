@@ -47,7 +47,21 @@ def _parsed_crs(crs: str) -> CRS:
 @lru_cache(maxsize=64)
 def _transformer(source_crs: str, target_crs: str) -> Transformer:
     # PROJ contexts must not be shared between threads: pyproj's Transformer (since 3.1) keeps one a thread itself.
-    return Transformer.from_crs(_parsed_crs(source_crs), _parsed_crs(target_crs), always_xy=True)
+    source, target = _parsed_crs(source_crs), _parsed_crs(target_crs)
+    try:
+        return Transformer.from_crs(source, target, always_xy=True)
+    except ProjError as error:
+        raise FrameRefused(f"nothing leads from {source_crs} to {target_crs}: {error}") from error
+
+
+def _operations(source: CRS, target: CRS) -> TransformerGroup:
+    """All operations between two CRS, the best first. Raises FrameRefused where there is none."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # that a better one needs a grid: the group says so itself
+        group = TransformerGroup(source, target, always_xy=True)
+    if not group.transformers:
+        raise FrameRefused(f"nothing leads from {source.to_string()} to {target.to_string()}")
+    return group
 
 
 def transform_coordinates(x: Floats, y: Floats, *, source_crs: str, target_crs: str) -> tuple[Floats, Floats]:
@@ -72,11 +86,7 @@ def transformation_between(*, source_crs: str, target_crs: str) -> str:
     source, target = _parsed_crs(source_crs), _parsed_crs(target_crs)
     if not (source.is_geographic or source.is_projected):
         raise FrameRefused(f"CRS {source_crs!r} is {source.type_name}: a geographic or projected CRS is needed")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # the same is said in the answer
-        group = TransformerGroup(source, target, always_xy=True)
-    if not group.transformers:
-        raise FrameRefused(f"nothing leads from {source_crs} to {target_crs}")
+    group = _operations(source, target)
     best = group.transformers[0]
     accuracy = f", accuracy {best.accuracy:g} m" if best.accuracy >= 0.0 else ""
     return f"{best.description}{accuracy}{'' if group.best_available else ', a better one needs a grid not installed'}"
@@ -94,11 +104,14 @@ def utm_crs(position: Wgs84Position) -> str:
 
 
 def pin_map_frame(*, crs: str, origin: GridPosition) -> MapFrame:
-    """The map frame of a projected CRS and an origin. Raises FrameRefused if `crs` is not projected in metres."""
+    """The map frame of a projected CRS and an origin.
+
+    Raises FrameRefused if `crs` is not projected in metres or has no known relation to WGS84.
+    """
     parsed = _parsed_crs(crs)
     if not parsed.is_projected or any(abs(axis.unit_conversion_factor - 1.0) > 0.0 for axis in parsed.axis_info[:2]):
         raise FrameRefused(f"CRS {crs!r} is {parsed.type_name}: a map needs a projected CRS in metres")
-    best = TransformerGroup(WGS84, parsed, always_xy=True).transformers[0]
+    best = _operations(_parsed_crs(WGS84), parsed).transformers[0]
     lon_deg, lat_deg = transform_coordinates(
         np.array([origin.easting_m]), np.array([origin.northing_m]), source_crs=crs, target_crs=WGS84
     )

@@ -90,6 +90,21 @@ def test_an_unknown_crs_is_refused_with_its_name() -> None:
         pin_map_frame(crs="EPSG:999999", origin=ORIGIN)
 
 
+def test_a_crs_of_another_celestial_body_is_refused() -> None:
+    with pytest.raises(FrameRefused, match="IAU_2015:30110"):
+        pin_map_frame(crs="IAU_2015:30110", origin=ORIGIN)
+
+
+def test_a_position_is_not_taken_to_another_celestial_body() -> None:
+    with pytest.raises(FrameRefused, match="nothing leads from EPSG:4326 to IAU_2015:30110"):
+        transform_coordinates(np.array([0.0]), np.array([0.0]), source_crs="EPSG:4326", target_crs="IAU_2015:30110")
+
+
+def test_a_crs_whose_best_operation_needs_a_grid_is_pinned_without_a_warning() -> None:
+    frame = pin_map_frame(crs="EPSG:27700", origin=GridPosition(400000.0, 100000.0))
+    assert frame.operation_accuracy_m > 0.0
+
+
 def test_a_position_outside_the_projection_is_refused() -> None:
     with pytest.raises(FrameRefused):
         transform_coordinates(np.array([0.0]), np.array([91.0]), source_crs="EPSG:4326", target_crs="EPSG:32756")
