@@ -102,18 +102,19 @@ def _csv_rows(path: Path, crs: str | None) -> list[AnchorRow]:
             reader = csv.DictReader(file)
             columns = [name.strip().lower() for name in reader.fieldnames or ()]
             reader.fieldnames = columns
-            lines = [(reader.line_num, line) for line in reader]
+            lines = [(f"{path}, line {reader.line_num}", line) for line in reader]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path} cannot be read as CSV: {error}") from error
     x_column, y_column, geographic = _position_columns(columns, path)
     return [
         _row(
             fields,
-            x=_number(fields, x_column, where=f"{path}, line {number}"),
-            y=_number(fields, y_column, where=f"{path}, line {number}"),
-            crs=crs or _csv_crs(fields, geographic=geographic, where=f"{path}, line {number}"),
+            x=_number(fields, x_column, where=where),
+            y=_number(fields, y_column, where=where),
+            crs=crs or _csv_crs(fields, geographic=geographic, where=where),
+            where=where,
         )
-        for number, fields in lines
+        for where, fields in lines
     ]
 
 
@@ -157,7 +158,7 @@ def _geojson_row(feature: _Feature, crs: str, where: str) -> AnchorRow:
     if geometry is None or geometry.type != "Point" or not isinstance(geometry.coordinates, list):
         raise InputError(f"{where} is {geometry.type if geometry else 'nothing'}: an anchor is a Point")
     point = dict(zip(("x", "y"), geometry.coordinates, strict=False))
-    return _row(fields, x=_number(point, "x", where=where), y=_number(point, "y", where=where), crs=crs)
+    return _row(fields, x=_number(point, "x", where=where), y=_number(point, "y", where=where), crs=crs, where=where)
 
 
 def _geopackage_rows(path: Path, crs: str | None) -> list[AnchorRow]:
@@ -181,18 +182,18 @@ def _geopackage_row(fields: Fields, geometry: bytes | None, crs: str, where: str
     point = None if geometry is None else from_wkb(geometry)
     if not isinstance(point, Point) or point.is_empty:
         raise InputError(f"{where} is {point.geom_type if point is not None else 'nothing'}: an anchor is a Point")
-    return _row(fields, x=point.x, y=point.y, crs=crs)
+    return _row(fields, x=point.x, y=point.y, crs=crs, where=where)
 
 
-def _row(fields: Fields, *, x: float, y: float, crs: str) -> AnchorRow:
+def _row(fields: Fields, *, x: float, y: float, crs: str, where: str) -> AnchorRow:
     return AnchorRow(
         anchor=next((text for name in NAME_COLUMNS if (text := _text(fields, name))), ""),
         x=x,
         y=y,
         crs=crs,
-        sigma_m=_sigma(fields, "sigma_m"),
+        sigma_m=_number(fields, "sigma_m", where=where),
         image=_text(fields, "image"),
-        image_sigma_m=_sigma(fields, "image_sigma_m"),
+        image_sigma_m=_number(fields, "image_sigma_m", where=where),
         kind=_text(fields, "kind"),
         signature=_text(fields, "signature"),
     )
@@ -210,7 +211,3 @@ def _number(fields: Fields, name: str, *, where: str) -> float:
         return float(_text(fields, name) or "nan")
     except ValueError as error:
         raise InputError(f"{where}: {name} is {_text(fields, name)!r}, a number is needed") from error
-
-
-def _sigma(fields: Fields, name: str) -> float:
-    return _number(fields, name, where=f"anchor {_text(fields, 'anchor')!r}")

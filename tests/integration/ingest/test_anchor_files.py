@@ -156,6 +156,7 @@ def test_a_geopackage_without_crs_is_refused(tmp_path: Path) -> None:
         ("a.csv", "anchor,east\np1,1\n", "lat and lon, or easting and northing"),
         ("a.csv", "anchor,lat,lon\n", "no anchor"),
         ("a.csv", "anchor,lat,lon\np1,south,151\n", "line 2: lat is 'south'"),
+        ("a.csv", "name,lat,lon,sigma_m\np1,-33,151,fine\n", r"a\.csv, line 2: sigma_m is 'fine'"),
         ("a.geojson", "", "cannot be read as a GeoJSON"),
         ("a.geojson", '{"type": "Feature"}', "features"),
         ("a.geojson", collection(), "no anchor"),
