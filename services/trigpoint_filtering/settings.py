@@ -1,11 +1,6 @@
 """What can be set from outside about filtering, with the values that were tuned on recorded drives."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
-
-from trigpoint.errors import InputError
-
-ENVIRONMENT_PREFIX = "TRIGPOINT_FILTERING_"
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,23 +20,3 @@ class FilterSettings:
     antenna_sigma_m: float = 0.3
     max_step_s: float = 0.2  # inputs are averaged over this: predicting at 10 Hz is no better and costs twice
     pose_interval_s: float = 0.2  # between published poses
-
-
-def settings_from_environment(environment: Mapping[str, str]) -> FilterSettings:
-    """The settings with every TRIGPOINT_FILTERING_<NAME> of the environment in place. Raises InputError."""
-    given: dict[str, float] = {}
-    for field in fields(FilterSettings):
-        name = ENVIRONMENT_PREFIX + field.name.upper()
-        if name in environment:
-            given[field.name] = _number(name, environment[name])
-    return FilterSettings(**given)
-
-
-def _number(name: str, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError as error:
-        raise InputError(f"{name} is {text!r}: a number is needed") from error
-    if not 0.0 < value < float("inf"):
-        raise InputError(f"{name} is {value}: it must be positive and finite")
-    return value

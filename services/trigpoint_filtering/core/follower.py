@@ -39,16 +39,6 @@ class DriveFollower:
         self._waiting: list[tuple[int, int, int, Observed]] = []
         self._newest_ns = 0
 
-    @property
-    def boot_id(self) -> str:
-        """The boot under which this drive's estimates are numbered."""
-        return self._publication.boot_id
-
-    @property
-    def held(self) -> int:
-        """How many events wait for earlier ones."""
-        return len(self._waiting)
-
     def take(self, row: Envelope[Observed]) -> list[Envelope[Estimated]]:
         """The estimates that can be given out now that one more event is here."""
         rank = RANKS.get(type(row.event))
