@@ -1,4 +1,4 @@
-"""What the optimiser solved: one map version is one MapSolved and what follows it. Writer: optimisation."""
+"""What the optimiser solved: one map version is one MapSolved and what stands before it. Writer: optimisation."""
 
 from dataclasses import dataclass
 

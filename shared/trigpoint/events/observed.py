@@ -9,7 +9,8 @@ class VehicleDescribed:
     origin at the middle of the rear axle (or of the turning axis).
 
     `steering` turns into yaw rate by `wheelbase_m` where wheels report steering; `track_m` where they report
-    left and right. `speed_wheel_y_m` is where the wheel that measures speed runs. `*_sigma` 0 means unknown.
+    left and right. `speed_wheel_y_m` is where the wheel that measures speed runs. A wheelbase, track or
+    range of 0 means unknown.
     `landmark_sensor_model` is "camera" where ranges come from the image (an error in proportion to the range, and
     depth rather than range), empty where they are measured, as by a lidar.
     `declared_crs` and `declared_origin_*` place a local metric frame when the source has no other reference
