@@ -37,11 +37,6 @@ class SeenSequences:
         index = bisect_right(starts, identity.sequence)
         return index > 0 and identity.sequence < stops[index - 1]
 
-    def __len__(self) -> int:
-        return sum(
-            stop - start for starts, stops in self._ranges.values() for start, stop in zip(starts, stops, strict=True)
-        )
-
     def boots(self) -> tuple[tuple[str, str], ...]:
         """All (source, boot_id) of which something was seen, in order of appearance."""
         return tuple(self._ranges)

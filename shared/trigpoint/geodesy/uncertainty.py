@@ -1,20 +1,9 @@
 """Covariances kept symmetric positive definite, and ellipses of them."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class Ellipse:
-    """A 1-sigma ellipse: semi-axes in metres, `heading_rad` of the longer one counter-clockwise from east."""
-
-    semi_major_m: float
-    semi_minor_m: float
-    heading_rad: float
 
 
 def floored_covariance(covariance: Floats, *, floor: float) -> Floats:
@@ -25,12 +14,6 @@ def floored_covariance(covariance: Floats, *, floor: float) -> Floats:
         return symmetric
     rebuilt: Floats = (vectors * np.maximum(values, floor)) @ vectors.T
     return 0.5 * (rebuilt + rebuilt.T)
-
-
-def ellipse_of(covariance_m2: Floats) -> Ellipse:
-    """The 1-sigma ellipse of a covariance (2, 2) in m^2, rows and columns east, north."""
-    semi_major_m, semi_minor_m, heading_rad = ellipses_of(covariance_m2[np.newaxis])[0]
-    return Ellipse(float(semi_major_m), float(semi_minor_m), float(heading_rad))
 
 
 def ellipses_of(covariance_m2: Floats) -> Floats:

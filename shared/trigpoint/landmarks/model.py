@@ -186,12 +186,6 @@ def provenance_json(observations: Sequence[tuple[str, str, int]]) -> str:
     return json.dumps(by_drive, ensure_ascii=False)
 
 
-def observations_of(provenance: str) -> tuple[tuple[str, str, int], ...]:
-    """The observations in a landmark's text, (vehicle, boot, sequence of the sweep) each, grouped by drive."""
-    drives = [(drive.partition("/"), sequences) for drive, sequences in json.loads(provenance).items()]
-    return tuple((vehicle, boot_id, seq) for (vehicle, _, boot_id), sequences in drives for seq in sequences)
-
-
 def valid_at(landmark: Landmark, map_version: int) -> bool:
     """Whether a landmark's row is part of a map version."""
     ends = landmark.valid_to_version

@@ -19,7 +19,7 @@ from landmark_maps.examples import (
 )
 from trigpoint.events.envelope import Envelope, EventIdentity, LogPosition
 from trigpoint.events.mapped import LandmarkSolved
-from trigpoint.landmarks.model import MapChange, observations_of
+from trigpoint.landmarks.model import MapChange
 from trigpoint_landmarks.core.rows import labels_within, map_change, valid_after
 from trigpoint_landmarks.core.versions import solved_versions
 
@@ -55,7 +55,8 @@ def test_the_ellipse_is_that_of_the_covariance() -> None:
 
 def test_a_landmark_names_its_observations() -> None:
     (row,) = changed(1, [solved_landmark("L1", 0.0, 0.0)]).opened
-    assert observations_of(row.provenance) == solved_landmark("L1", 0.0, 0.0).observations
+    sweeps = [("/".join(drive), sequence) for *drive, sequence in solved_landmark("L1", 0.0, 0.0).observations]
+    assert [(drive, seq) for drive, seqs in json.loads(row.provenance).items() for seq in seqs] == sweeps
 
 
 def test_a_landmark_is_anchored_by_the_anchors_it_names() -> None:
