@@ -44,8 +44,6 @@ from trigpoint.landmarks.queries import (
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
-Record = dict[str, object]
-
 
 class GeoPackageStore:
     """A LandmarkStore in the file at `path`; see `opened` for what that raises. Not for several threads at once."""
@@ -113,7 +111,7 @@ class GeoPackageStore:
         """The file closed."""
         close(self._connection)
 
-    def _records(self, source: Table) -> Iterator[Record]:
+    def _records(self, source: Table) -> Iterator[records.Record]:
         for record in self._connection.execute(select(source)).mappings():
             yield dict(record)
 
@@ -128,7 +126,7 @@ class GeoPackageStore:
         return as_of < known[-1]
 
     def _found(self, source: Table, query: LandmarkQuery, *, older: bool) -> Iterable[Landmark]:
-        bound: Record = {"kind": query.kind, "as_of": query.as_of, "limit": query.limit}
+        bound: records.Record = {"kind": query.kind, "as_of": query.as_of, "limit": query.limit}
         box = area_box(query)
         window = None
         if box is not None:
@@ -182,7 +180,7 @@ class GeoPackageStore:
             reason = f"map version {change.version.map_version} opens a landmark still valid: {error}"
             raise InputError(reason) from error
 
-    def _insert(self, target: Table, rows: Sequence[Record]) -> None:
+    def _insert(self, target: Table, rows: Sequence[records.Record]) -> None:
         if rows:
             self._connection.execute(insert(target), rows)
 

@@ -5,10 +5,10 @@ from collections.abc import Mapping
 from dataclasses import fields
 from functools import lru_cache
 
+from trigpoint.landmarks.geopackage_geometry import Coordinates
 from trigpoint.landmarks.model import Anchor, ImageOffset, MapVersion, Trajectory
 
 Record = dict[str, object]
-Coordinates = tuple[tuple[float, float], ...]
 
 
 def _plain(row: Trajectory | Anchor | ImageOffset | MapVersion, *without: str) -> Record:

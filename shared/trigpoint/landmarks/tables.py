@@ -6,7 +6,7 @@ from sqlalchemy import REAL, BigInteger, Boolean, Column, Integer, MetaData, Tab
 from sqlalchemy.engine import Dialect
 from sqlalchemy.types import LargeBinary, TypeDecorator, TypeEngine, UserDefinedType
 
-from trigpoint.landmarks.geopackage_geometry import decoded, encoded_line, encoded_point
+from trigpoint.landmarks.geopackage_geometry import Coordinates, decoded, encoded_line, encoded_point
 
 metadata = MetaData()
 
@@ -27,7 +27,7 @@ class GeometryColumn(UserDefinedType[bytes]):
         return self.geometry_name
 
 
-class LandmarkGeometry(TypeDecorator[tuple[int, tuple[tuple[float, float], ...]]]):
+class LandmarkGeometry(TypeDecorator[tuple[int, Coordinates]]):
     """A point ("POINT") or line ("LINESTRING") as (srs id, coordinates): GeoPackage bytes on SQLite.
 
     A server database gets its own branch in `load_dialect_impl`; the tables below stay as they are.
@@ -46,9 +46,7 @@ class LandmarkGeometry(TypeDecorator[tuple[int, tuple[tuple[float, float], ...]]
             raise NotImplementedError(f"geometry on {dialect.name}: only sqlite is there")
         return dialect.type_descriptor(GeometryColumn(self.geometry_name))
 
-    def process_bind_param(
-        self, value: tuple[int, tuple[tuple[float, float], ...]] | None, dialect: Dialect
-    ) -> bytes | None:
+    def process_bind_param(self, value: tuple[int, Coordinates] | None, dialect: Dialect) -> bytes | None:
         """GeoPackage bytes."""
         if value is None:
             return None
@@ -57,9 +55,7 @@ class LandmarkGeometry(TypeDecorator[tuple[int, tuple[tuple[float, float], ...]]
             return encoded_point(*points[0], srs_id=srs_id)
         return encoded_line(points, srs_id=srs_id)
 
-    def process_result_value(
-        self, value: bytes | None, dialect: Dialect
-    ) -> tuple[int, tuple[tuple[float, float], ...]] | None:
+    def process_result_value(self, value: bytes | None, dialect: Dialect) -> tuple[int, Coordinates] | None:
         """The srs id and the coordinates."""
         return None if value is None else (int.from_bytes(value[4:8], "little", signed=True), decoded(value))
 
