@@ -25,7 +25,7 @@ CHUNK_HEAD_BYTES = FRAME.size + 8 + 8 + 8 + 4  # up to the name of the compressi
 COMPRESSION_NAMES = (b"\x04\x00\x00\x00zstd", b"\x03\x00\x00\x00lz4")
 KNOWN_OPCODES = frozenset(int(opcode) for opcode in Opcode)
 PRIVATE_OPCODES = 0x80  # this and above: an application's own, to be skipped
-UNKNOWN = -1
+UNKNOWN = -1  # messages lost
 
 
 @dataclass(frozen=True, slots=True)

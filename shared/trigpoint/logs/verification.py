@@ -9,9 +9,7 @@ from trigpoint.events.seen import SeenSequences
 from trigpoint.logs.channels import ChannelKey
 from trigpoint.logs.chunks import ChunkMessage, messages
 from trigpoint.logs.log_files import SUFFIX, file_numbers
-from trigpoint.logs.mcap_scan import McapScan
-
-UNKNOWN = -1  # messages lost
+from trigpoint.logs.mcap_scan import UNKNOWN, McapScan
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +133,7 @@ class _Verifier:
             Finding(scan.path, damage.offset, kind, damage.reason, damage.lost_messages) for damage in scan.damages
         ]
 
-    def numbers(self, folder: Path, files: Iterable[FileSummary]) -> None:
+    def numbers(self, files: Iterable[FileSummary]) -> None:
         """Files of a stream follow one another without gap: each begins where the one before ended."""
         expected = 0
         for file in files:
@@ -163,7 +161,7 @@ def verify(path: Path) -> Verification:
     for folder, numbered in _folders(path):
         summaries = [verifier.file(file, folder.name if numbered else file.stem) for file in _files(path, folder)]
         if numbered:
-            verifier.numbers(folder, summaries)
+            verifier.numbers(summaries)
         files += summaries
     if not files:
         raise InputError(f"{path}: no {SUFFIX} file there")
