@@ -47,7 +47,8 @@ class MemoryLog:
 
     def streams(self) -> tuple[str, ...]:
         """The names of all streams that hold an event, sorted."""
-        return tuple(sorted(stream for stream, rows in self._streams.items() if rows))
+        with self._lock:
+            return tuple(sorted(stream for stream, rows in self._streams.items() if rows))
 
     def next_number(self, stream: str) -> int:
         """The number the next appended event will get."""
