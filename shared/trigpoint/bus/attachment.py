@@ -53,10 +53,10 @@ def encode_bundle(parts: Sequence[tuple[bytes, bytes]]) -> tuple[bytes, bytes]:
     return _BUNDLE.pack(BUNDLE_VERSION, len(parts)), b"".join(packed)
 
 
-def bundled_count(attachment: bytes) -> int:
-    """How many messages a transmission says it holds: 1 unless it is a bundle."""
-    count: int = _BUNDLE.unpack(attachment)[1] if is_bundle(attachment) else 1
-    return count
+def bundled_count(attachment: bytes, payload: bytes) -> int:
+    """How many messages a transmission holds: what a bundle says, as far as its payload has room for them, else 1."""
+    said: int = _BUNDLE.unpack(attachment)[1] if is_bundle(attachment) else 1
+    return max(min(said, len(payload) // _LENGTHS.size), 1)
 
 
 def is_bundle(attachment: bytes) -> bool:

@@ -10,39 +10,46 @@ INBOX_CAPACITY = 65_536  # messages; at 100 B each some 20 MB, half a second of 
 
 
 class Inbox(Generic[ItemT]):
-    """Items in order of arrival, at most `capacity` of them; the newest are dropped, and counted, when full."""
+    """Items in order of arrival, of at most `capacity` messages; the newest are dropped, and counted, when full."""
 
     def __init__(self, capacity: int = INBOX_CAPACITY) -> None:
         self._capacity = capacity
-        self._items: queue.SimpleQueue[ItemT | None] = queue.SimpleQueue()
+        self._items: queue.SimpleQueue[tuple[ItemT, int] | None] = queue.SimpleQueue()
+        self._held = 0  # messages
         self._lost = 0
         self._lock = threading.Lock()
         self._closed = threading.Event()
 
     @property
     def lost(self) -> int:
-        """How many items were dropped because the inbox was full."""
+        """How many messages were dropped because the inbox was full."""
         return self._lost
 
     def offer(self, item: ItemT, *, count: int = 1) -> None:
-        """The item queued, or lost if the inbox is full, counted as `count`; without effect once closed."""
+        """The item of `count` messages queued, or lost if the inbox is full; without effect once closed."""
         if self._closed.is_set():
             return
-        if self._items.qsize() < self._capacity:
-            self._items.put(item)
-            return
         with self._lock:
-            self._lost += count
+            if self._held < self._capacity:
+                self._held += count
+                self._items.put((item, count))
+            else:
+                self._lost += count
 
     def take(self, timeout_s: float) -> ItemT | None:
         """The oldest item, or None if none came within `timeout_s` or the inbox is closed."""
         if self._closed.is_set():
             return None
         try:
-            item = self._items.get(timeout=timeout_s) if timeout_s > 0.0 else self._items.get_nowait()
+            taken = self._items.get(timeout=timeout_s) if timeout_s > 0.0 else self._items.get_nowait()
         except queue.Empty:
             return None
-        return None if self._closed.is_set() else item
+        if taken is None or self._closed.is_set():
+            return None
+        item, count = taken
+        with self._lock:
+            self._held -= count
+        return item
 
     def close(self) -> None:
         """Nothing more comes in or out; a `take` that waits returns None."""

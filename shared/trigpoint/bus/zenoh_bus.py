@@ -104,7 +104,7 @@ class ZenohSubscription:
         attached = sample.attachment
         attachment = attached.to_bytes() if attached is not None else b""
         arrival = _Arrival(str(sample.key_expr), str(sample.encoding), sample.payload.to_bytes(), attachment)
-        self._inbox.offer(arrival, count=bundled_count(attachment))
+        self._inbox.offer(arrival, count=bundled_count(attachment, arrival.payload))
 
     @property
     def lost(self) -> int:

@@ -53,15 +53,21 @@ def test_a_sequence_beyond_64_bits_is_refused() -> None:
         encode_attachment(EventIdentity("vehicle", "boot", 2**63), stamp_ns=1, schema_version=1)
 
 
-@given(parts=st.lists(st.tuples(st.binary(max_size=30), st.binary(max_size=30))))
+@given(parts=st.lists(st.tuples(st.binary(max_size=30), st.binary(max_size=30)), min_size=1))
 def test_what_was_bundled_comes_out_again_and_its_number_is_known(parts: list[tuple[bytes, bytes]]) -> None:
     attachment, payload = encode_bundle(parts)
     assert list(decode_bundle(payload)) == parts
-    assert bundled_count(attachment) == len(parts)
+    assert bundled_count(attachment, payload) == len(parts)
 
 
 def test_a_single_message_counts_as_one() -> None:
-    assert bundled_count(encode_attachment(EventIdentity("v", "b", 1), stamp_ns=1, schema_version=1)) == 1
+    attachment = encode_attachment(EventIdentity("v", "b", 1), stamp_ns=1, schema_version=1)
+    assert bundled_count(attachment, b"x" * 100) == 1
+
+
+@pytest.mark.parametrize(("said", "payload", "count"), [(2**32 - 1, b"x" * 100, 12), (5, b"", 1), (0, b"x" * 100, 1)])
+def test_a_bundle_holds_no_more_than_its_payload_has_room_for(said: int, payload: bytes, count: int) -> None:
+    assert bundled_count(b"\x02" + said.to_bytes(4, "little"), payload) == count
 
 
 @pytest.mark.parametrize("cut", [1, 5, 12])
