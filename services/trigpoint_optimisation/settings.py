@@ -51,7 +51,7 @@ HONEST_EDGES = FixSettings(
     sigma_m=1.5,
     bias_sigma_m=2.5,
     bias_time_s=300.0,
-    kernel=Kernel("dcs", 3.0),
+    kernel=Kernel("cauchy", 2.0),  # stretches of multipath that pass the gate lie within three sigmas too
     landmark_kernel=Kernel("dcs", 3.0),
 )
 
