@@ -6,6 +6,7 @@ from typing import cast
 from trigpoint.bus.event_messages import event_message
 from trigpoint.bus.listening import ListeningService
 from trigpoint.bus.ports import Bus, BusMessage
+from trigpoint.errors import EventRejected
 from trigpoint.events.codec import Event, decode
 from trigpoint.events.envelope import Envelope
 from trigpoint.events.estimated import Estimated
@@ -55,9 +56,13 @@ class LiveFiltering(ListeningService):
         expected = self._expected.get(drive, 0)
         if self._frame is None or sequence < expected:
             return  # before the frame is pinned nothing can be placed: the log still has the message then
+        try:
+            event = cast(Observed, decode(message.schema_name, message.payload))
+        except EventRejected as error:
+            logger.warning("%s on %s is left to the log: %s", message.identity, message.key, error)
+            return
         if sequence > expected:
             self.catch_up(drive, until_sequence=sequence)
-        event = cast(Observed, decode(message.schema_name, message.payload))
         self._follow(Envelope(message.identity, message.stamp_ns, event), self._frame)
 
     def catch_up(self, drive: tuple[str, str], *, until_sequence: int | None = None) -> None:

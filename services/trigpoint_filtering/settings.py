@@ -1,4 +1,4 @@
-"""What can be set from outside about filtering, with the values that were tuned on recorded drives."""
+"""What can be set about filtering, with the values that were tuned on recorded drives."""
 
 from dataclasses import dataclass
 

@@ -3,6 +3,7 @@
 import math
 import threading
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pytest
 
@@ -138,6 +139,17 @@ def test_messages_lost_on_the_bus_are_taken_from_the_log() -> None:
     whole, live = pinned_log(rows), pinned_log()
     filter_log(whole)
     heard_live(live, rows, [row for row in rows[:-40] if row.identity.sequence % 11])
+    assert said(live) == said(whole)
+
+
+def test_a_message_that_cannot_be_read_is_taken_from_the_log() -> None:
+    rows = rows_of(driven(COURSE).drive)
+    whole, live, exchange = pinned_log(rows), pinned_log(rows), MemoryExchange()
+    filter_log(whole)
+    with MemoryBus(exchange) as sender, LiveFiltering(live, MemoryBus(exchange)) as service:
+        for message in (message_of(rows[0]), replace(message_of(rows[1]), payload=b"\xff"), message_of(rows[2])):
+            sender.publish(message)
+            service.step(0.0)
     assert said(live) == said(whole)
 
 
