@@ -94,9 +94,11 @@ class _UnderWay:
             if self._progressed():
                 return
             self._send_again()
+        if self._progressed():
+            return
         oldest = self._unacknowledged[0].identity
         raise ServiceError(
-            f"{oldest}: {len(self._unacknowledged)} messages unacknowledged after {self._settings.attempts} "
+            f"{oldest}: {len(self._unacknowledged)} messages unacknowledged after {self._settings.attempts + 1} "
             f"times {self._settings.ack_timeout_s:g} s; what was acknowledged before is kept"
         )
 

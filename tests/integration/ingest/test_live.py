@@ -298,8 +298,28 @@ def test_a_replay_that_nobody_hears_says_so(rows: Rows) -> None:
 def test_a_replay_that_nobody_acknowledges_says_so(rows: Rows) -> None:
     with MemoryBus() as bus:
         bus.subscribe("trigpoint/v1/veh/*/up/*")
-        with pytest.raises(ServiceError, match="20 messages unacknowledged after 2 times"):
+        with pytest.raises(ServiceError, match="20 messages unacknowledged after 3 times"):
             replay_rows(rows[:20], bus, settings=replace(PATIENT, ack_timeout_s=0.01, attempts=2))
+
+
+class DeafEarBus(MemoryBus):
+    """A bus whose vehicle is acknowledged once a message was sent three times."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._sent = 0
+
+    def publish_all(self, messages: Sequence[BusMessage]) -> None:
+        self._sent += 1
+        if self._sent == 3:
+            self.publish(replace(messages[-1], key="trigpoint/v1/ack/veh-a"))
+
+
+def test_an_acknowledgement_of_the_last_attempt_counts(rows: Rows) -> None:
+    with DeafEarBus() as bus:
+        bus.subscribe("trigpoint/v1/veh/*/up/*")
+        report = replay_rows(rows[:20], bus, settings=replace(PATIENT, ack_timeout_s=0.01, attempts=2))
+    assert report.resent == 40
 
 
 def live(row: Envelope[Observed]) -> BusMessage:
