@@ -18,9 +18,9 @@ STANDARD_GRAVITY_MPS2 = 9.80665
 
 
 class ManifestPart(BaseModel):
-    """A part of a manifest; keys it does not know are refused."""
+    """A part of a manifest; keys it does not know are refused, and numbers that are not finite."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Quantity(ManifestPart):

@@ -96,3 +96,12 @@ def test_a_part_may_be_a_list() -> None:
     part = 'time = "t", lat = "lat", lon = "lon"'
     parsed = manifest(f'fixes = [{{ file = "a.csv", {part} }}, {{ file = "b.csv", {part} }}]')
     assert parsed.files() == ("a.csv", "b.csv")
+
+
+@pytest.mark.parametrize(
+    "vehicle",
+    ['inertial = { time = { column = "t", offset_s = inf }, yaw_rate = "w" }', "geometry = { track_m = nan }"],
+)
+def test_a_number_that_is_not_finite_is_refused(vehicle: str) -> None:
+    with pytest.raises(InputError, match="Input should be a finite number"):
+        manifest(vehicle)
