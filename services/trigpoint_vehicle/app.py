@@ -43,7 +43,10 @@ def read_source(folder: Path, name: str) -> SourceText:
 
 
 def write_conversion(conversion: Conversion, out_dir: Path) -> Written:
-    """One `<vehicle>.mcap` a vehicle, `truth.csv` and `anchors.geojson` where there are any. Raises InputError."""
+    """One `<vehicle>.mcap` a vehicle, `truth.csv` and `anchors.geojson` where there are any.
+
+    Raises InputError for a folder that cannot be written, AppendFailed for a log.
+    """
     for remark in conversion.remarks:
         logger.warning(remark)
     truth, anchors = out_dir / TRUTH_NAME, out_dir / ANCHORS_NAME

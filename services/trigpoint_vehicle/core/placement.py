@@ -12,6 +12,8 @@ from trigpoint_vehicle.core.streets import Streets
 
 Floats = NDArray[np.float64]
 
+PAIRS_APART_M = 10.0  # one pair from another, so that each second pole has one partner only
+PAIR_DIRECTIONS = 16  # tried around each pole for a second one
 CANDIDATES_FACTOR = 12  # candidates drawn for each landmark wanted; most fall to spacing or clearance
 
 
@@ -84,14 +86,14 @@ def _poles_m(ground: _Ground, rng: np.random.Generator) -> list[Floats]:
     single = settings.pole_count - settings.pair_count
     drawn = _candidates_m(streets, setback_m, settings, count=CANDIDATES_FACTOR * max(single, 1), rng=rng)
     poles = _spaced(ground.clear_of_traffic(drawn), [], count=single, spacing_m=settings.spacing_min_m)
-    turn = rng.uniform(0.0, 2.0 * np.pi, (len(poles), 16))
+    turn = rng.uniform(0.0, 2.0 * np.pi, (len(poles), PAIR_DIRECTIONS))
     ring = settings.pair_distance_m * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
     beside = (np.array(poles)[:, None, :] + ring).reshape(-1, 2) if poles else np.empty((0, 2))
     clear = rng.permutation(ground.clear_of_traffic(beside)) if len(beside) else beside
     # a second pole may stand closer than the spacing to its own partner only
     tree = cKDTree(np.array(poles)) if poles else None
     lonely = [point for point in clear if tree is not None and _only_one_near(tree, point, settings)]
-    return poles + _spaced(np.array(lonely).reshape(-1, 2), [], count=settings.pair_count, spacing_m=10.0)
+    return poles + _spaced(np.array(lonely).reshape(-1, 2), [], count=settings.pair_count, spacing_m=PAIRS_APART_M)
 
 
 def _only_one_near(tree: cKDTree, point_m: Floats, settings: LandmarkSettings) -> bool:
