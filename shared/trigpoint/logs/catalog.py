@@ -102,10 +102,15 @@ class Catalog:
             self._insert(entry)
 
     def replace(self, entry: CatalogEntry) -> None:
-        """All that was known of a file replaced by this, in one transaction."""
+        """All that was known of a file replaced by this, in one transaction; not where more of its chunks are known.
+
+        They were durable once: the file lost them, or its writer was faster than whoever read it.
+        """
         with self._lock, self._connection:
-            self._delete(entry.file)
-            self._insert(entry)
+            self._connection.execute("BEGIN IMMEDIATE")
+            if self._chunk_count(entry.file) <= len(entry.chunks):
+                self._delete(entry.file)
+                self._insert(entry)
 
     def remove(self, file: CatalogFile) -> None:
         """A file forgotten with all that was in it."""
@@ -127,6 +132,10 @@ class Catalog:
             "INSERT OR REPLACE INTO channel VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
             [(*key, channel_id, *_channel_values(channel)) for channel_id, channel in entry.channels],
         )
+
+    def _chunk_count(self, file: CatalogFile) -> int:
+        statement = "SELECT COUNT(*) FROM chunk WHERE stream = ? AND first_number = ?"
+        return int(self._rows(statement, (file.stream, file.first_number))[0][0])
 
     def _delete(self, file: CatalogFile) -> None:
         for table in ("file", "chunk", "channel"):

@@ -68,9 +68,7 @@ def bring_up_to_date(catalog: Catalog, folder: Path, stream: str) -> None:
     for first_number in there:
         size_bytes = file_path(folder, first_number).stat().st_size
         if first_number not in known or known[first_number].size_bytes != size_bytes:
-            entry = entry_of(folder, stream, first_number)
-            if not lost_chunks(catalog, entry):
-                catalog.replace(entry)
+            catalog.replace(entry_of(folder, stream, first_number))
     for gone in known.keys() - set(there):
         catalog.remove(known[gone])
 

@@ -18,6 +18,7 @@ from trigpoint.errors import AppendFailed, InputError, LogDamaged
 from trigpoint.events.envelope import Envelope, EventIdentity, LogPosition
 from trigpoint.events.estimated import FixJudged
 from trigpoint.events.observed import GnssFixReceived, MapFramePinned
+from trigpoint.logs.log_files import entry_of
 from trigpoint.logs.mcap_log import McapLog
 from trigpoint.logs.stream_writer import Rotation
 
@@ -137,6 +138,14 @@ def test_a_reader_sees_what_another_log_appends(log: McapLog) -> None:
     log.append(STREAM, imu_rows(3, 4))
     assert reader.next_number(STREAM) == 4
     reader.close()
+
+
+def test_a_slow_reader_takes_nothing_out_of_the_catalog(log: McapLog) -> None:
+    log.append(STREAM, imu_rows(0, 5))
+    read_before = entry_of(log.directory / STREAM, STREAM, 0)
+    log.append(STREAM, imu_rows(5, 10))
+    log._catalog.replace(read_before)
+    assert _sequences(log) == list(range(10))
 
 
 def test_a_closed_stream_can_be_written_by_another(log: McapLog) -> None:
