@@ -46,11 +46,14 @@ def stale_files() -> tuple[str, ...]:
 
 
 def main(arguments: list[str]) -> int:
-    """Exit status: 0 once all is fresh; with --check 1 if something is stale, and nothing is written."""
+    """Exit status: 0 once all is fresh, 2 for bad usage; with --check 1 if something is stale, and nothing is written."""
     if arguments == ["--check"]:
         stale = stale_files()
         sys.stderr.writelines(f"stale: {name}\n" for name in stale)
         return 1 if stale else 0
+    if arguments:
+        sys.stderr.write(f"{' '.join(arguments)}: only --check is known\n")
+        return 2
     generate(PACKAGE.parent)
     return 0
 
