@@ -46,7 +46,10 @@ def stale_files() -> tuple[str, ...]:
 
 
 def main(arguments: list[str]) -> int:
-    """Exit status: 0 once all is fresh, 2 for bad usage; with --check 1 if something is stale, and nothing is written."""
+    """Exit status: 0 once all is fresh, 2 for bad usage.
+
+    With --check nothing is written, and 1 says that something is stale.
+    """
     if arguments == ["--check"]:
         stale = stale_files()
         sys.stderr.writelines(f"stale: {name}\n" for name in stale)
