@@ -140,7 +140,7 @@ def evaluate_truth(
 ) -> TruthEvaluation:
     """A map version's landmarks and paths, and the filter's verdicts, against truth; nothing is aligned first.
 
-    joint_covariance (2n, 2n) in m^2, x and y of each of the map's landmarks in turn.
+    joint_covariance_m2 (2n, 2n): x and y of each of the map's landmarks in turn.
     """
     solved, frame, drives = evaluated.solved, evaluated.frame, evaluated.drives
     paths, vehicles = evaluate_paths(solved.trajectories, drives, truth, frame)

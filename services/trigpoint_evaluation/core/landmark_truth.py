@@ -105,7 +105,7 @@ def evaluate_landmarks(
     joint_covariance_m2: Floats | None = None,
     limit_m: float = MATCH_LIMIT_M,
 ) -> LandmarkTruthEvaluation:
-    """The errors of the matched landmarks; joint_covariance (2n, 2n) in m^2, x and y of each landmark in turn."""
+    """The errors of the matched landmarks; joint_covariance_m2 (2n, 2n): x and y of each landmark in turn."""
     matches = matched(estimated, truth, limit_m=limit_m)
     error_m = estimated.point_m[matches.estimated] - truth.point_m[matches.truth]
     shift_m = error_m.mean(axis=0) if len(error_m) else np.full(2, np.nan)

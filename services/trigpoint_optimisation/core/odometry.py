@@ -41,7 +41,7 @@ class TurnSource(Enum):
 class OdometryCalibration:
     """Calibration of one drive's odometry: true speed = `speed_scale` x measured; true turn = `turn_scale` x
     measured + bias, where turn is steering angle (rad) or yaw rate by TurnSource; the bias of an IMU is in rad/s, of
-    wheels in rad/m (unequal wheel radii turn per metre, not per second).
+    wheels and commands in rad/m (unequal wheel radii turn per metre, not per second).
 
     The wheels' clock reads `delay_s` more than the other sensors' at the same instant.
     `turn_bias` (m,) at `bias_stamp_ns` (m,), held between them.

@@ -192,7 +192,7 @@ def seen_by(solved: Solved) -> Seen:
 def full_graph(
     solved: Solved, *, with_labels: bool = True, single_kernel: Kernel | None = None
 ) -> gtsam.NonlinearFactorGraph:
-    """The graph of a solve: odometry, fixes, landmarks, and labels if wanted; kernels on fixes, landmarks, labels."""
+    """The graph of a solve: odometry, fixes, landmarks, and labels if wanted; kernels on fixes and sightings."""
     settings, seen = solved.fleet.settings, seen_by(solved)
     if settings.method == "rigid" and not with_fix_bias(solved.state):
         return rigid_graph(solved.fleet, solved.state, seen)

@@ -23,7 +23,7 @@ def scale_key(drive: int) -> int:
 
 
 def turn_bias_key(drive: int, knot: int) -> int:
-    """Turn bias (1,) from a knot on: rad (steering) or rad/s."""
+    """Turn bias (1,) from a knot on, in the unit `OdometryCalibration` gives it."""
     return int(gtsam.symbol("b", drive * DRIVE_STRIDE + knot))
 
 
@@ -48,7 +48,7 @@ def image_key(image: int) -> int:
 
 
 def sensor_key(drive: int) -> int:
-    """Calibration (6,) of a drive's landmark sensor, see `camera_factor`."""
+    """Calibration (6,) of a drive's landmark sensor, see `sighting_factor`."""
     return int(gtsam.symbol("s", drive))
 
 
