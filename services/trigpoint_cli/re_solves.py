@@ -23,7 +23,6 @@ class Agreement:
     """How the reduction's predictions differ from full solves': `prediction_m` label by label, `mean_error_m` in the
     mean error over all draws, which is what is reported."""
 
-    draws: int
     prediction_m: ErrorSummary
     mean_error_m: float
 
@@ -41,7 +40,6 @@ def agreement_with_re_solves(solved: Solved, reduction: LabelReduction, tied: In
         progress(draw + 1, len(tied))
     error_m = np.linalg.norm(linear, axis=-1).mean() - np.linalg.norm(full, axis=-1).mean()
     return Agreement(
-        draws=len(tied),
         prediction_m=summary_of(np.linalg.norm(full - linear, axis=-1)),
         mean_error_m=float(abs(error_m)),
     )

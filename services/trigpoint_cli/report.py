@@ -34,8 +34,8 @@ from trigpoint_evaluation.core.draws import (
 )
 from trigpoint_evaluation.report.content import LeaveOutCurves, ReportContent, UntiedResiduals
 from trigpoint_evaluation.report.page import report_page
+from trigpoint_evaluation.settings import EvaluationSettings
 
-CURVE_DRAWS = 100  # for every number of tied labels: enough for a smooth band
 SOFTWARE = ("trigpoint", "gtsam", "filterpy", "numpy", "scipy", "pyproj", "mcap", "eclipse-zenoh", "matplotlib")
 
 
@@ -106,7 +106,8 @@ def _with_reduction(content: ReportContent, reduction: LabelReduction, screen: S
     """The content with what held-out anchors say."""
     if not reduction.labels:
         return content
-    draws = LeaveOutDraws(draws=CURVE_DRAWS, seed=0)
+    settings = EvaluationSettings()
+    draws = LeaveOutDraws(draws=settings.curve_draws, seed=settings.curve_seed)
     with screen.part_of("leaving out") as progress:
         everywhere = left_out_curve(reduction, draws, progress=progress)
     blocked = left_out_curve(reduction, replace(draws, blocked=True))

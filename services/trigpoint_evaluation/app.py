@@ -19,12 +19,7 @@ from trigpoint.geodesy.projection import MapFrame, map_points_from_wgs84
 from trigpoint.logs.ports import EventLog
 from trigpoint.logs.readings import logged_maps
 from trigpoint_evaluation.core.consistency import GateTruth, JudgedFixes, gate_truth, judged_fixes
-from trigpoint_evaluation.core.landmark_truth import (
-    MATCH_LIMIT_M,
-    LandmarkTruthEvaluation,
-    MappedPoints,
-    evaluate_landmarks,
-)
+from trigpoint_evaluation.core.landmark_truth import LandmarkTruthEvaluation, MappedPoints, evaluate_landmarks
 from trigpoint_evaluation.core.path_truth import PathTruthEvaluation, evaluate_paths
 
 Floats = NDArray[np.float64]
@@ -131,13 +126,7 @@ def judged(drives: Sequence[Drive], verdicts: Sequence[FixJudged]) -> tuple[Judg
     return tuple(judged_fixes(drive, verdicts) for drive in drives)
 
 
-def evaluate_truth(
-    evaluated: Evaluated,
-    truth: Truth,
-    *,
-    joint_covariance_m2: Floats | None = None,
-    match_limit_m: float = MATCH_LIMIT_M,
-) -> TruthEvaluation:
+def evaluate_truth(evaluated: Evaluated, truth: Truth, *, joint_covariance_m2: Floats | None = None) -> TruthEvaluation:
     """A map version's landmarks and paths, and the filter's verdicts, against truth; nothing is aligned first.
 
     joint_covariance_m2 (2n, 2n): x and y of each of the map's landmarks in turn.
@@ -146,10 +135,7 @@ def evaluate_truth(
     paths, vehicles = evaluate_paths(solved.trajectories, drives, truth, frame)
     return TruthEvaluation(
         landmarks=evaluate_landmarks(
-            mapped_points(solved),
-            true_points(truth, frame),
-            joint_covariance_m2=joint_covariance_m2,
-            limit_m=match_limit_m,
+            mapped_points(solved), true_points(truth, frame), joint_covariance_m2=joint_covariance_m2
         ),
         paths=paths,
         vehicles=vehicles,

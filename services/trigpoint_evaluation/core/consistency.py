@@ -15,10 +15,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-NIS_DEGREES_OF_FREEDOM = 2
 CONFIDENCE = 0.95
 CLEAR, CAR_PARK = "clear", "car park"  # states of simulated fixes
-REJOINED = "re-acquired"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -99,14 +99,10 @@ class LandmarkTruthEvaluation:
 
 
 def evaluate_landmarks(
-    estimated: MappedPoints,
-    truth: MappedPoints,
-    *,
-    joint_covariance_m2: Floats | None = None,
-    limit_m: float = MATCH_LIMIT_M,
+    estimated: MappedPoints, truth: MappedPoints, *, joint_covariance_m2: Floats | None = None
 ) -> LandmarkTruthEvaluation:
     """The errors of the matched landmarks; joint_covariance_m2 (2n, 2n): x and y of each landmark in turn."""
-    matches = matched(estimated, truth, limit_m=limit_m)
+    matches = matched(estimated, truth)
     error_m = estimated.point_m[matches.estimated] - truth.point_m[matches.truth]
     shift_m = error_m.mean(axis=0) if len(error_m) else np.full(2, np.nan)
     nees = _each_nees(error_m, estimated.covariance_m2, matches.estimated)

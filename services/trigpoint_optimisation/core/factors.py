@@ -6,7 +6,6 @@ body frame: x, y in m, heading in rad.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import gtsam
@@ -18,8 +17,6 @@ from trigpoint.geodesy.poses import wrap_angle_rad
 Floats = NDArray[np.float64]
 Jacobians = list[Floats] | None
 MIN_DISTANCE_M = 0.2  # nearer than this a sighting's logarithm and bearing have no usable derivative
-
-ErrorFunction = Callable[[gtsam.CustomFactor, gtsam.Values, Jacobians], Floats]
 
 
 def odometry_factor(
