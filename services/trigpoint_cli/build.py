@@ -8,6 +8,7 @@ from trigpoint.events.solved import SolvedMap
 from trigpoint_cli.data_dir import DataDirectory, data_option
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering, metres
 from trigpoint_cli.pipeline import Built, build_map
+from trigpoint_evaluation.core.paths import path_length_m
 from trigpoint_evaluation.core.summary import summary_of
 from trigpoint_optimisation.settings import Edges, Method
 
@@ -45,7 +46,7 @@ def _drives_values(solved: SolvedMap, vehicle: str) -> list[JsonObject]:
         {
             "boot_id": one.boot_id,
             "poses": len(one.stamp_ns),
-            "length_m": float(np.hypot(*np.diff(one.pose[:, :2], axis=0).T).sum()),
+            "length_m": path_length_m(one.pose),
             "calibration": {name: {"value": value, "sigma": sigma} for name, value, sigma in one.calibration},
         }
         for one in solved.trajectories

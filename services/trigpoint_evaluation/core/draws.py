@@ -61,6 +61,11 @@ def image_labels(reduction: LabelReduction, image: str) -> tuple[str, Ints]:
     return image, np.flatnonzero(numbers == reduction.images.index(image))
 
 
+def _chosen_labels(reduction: LabelReduction, image: str | None) -> Ints:
+    """The numbers of all labels, or of one image's."""
+    return np.arange(len(reduction.labels)) if image is None else image_labels(reduction, image)[1]
+
+
 def random_draws(among: Ints, tied: int, draws: int, rng: np.random.Generator) -> Ints:
     """Label numbers (k, tied), each row a draw without repetition from `among`."""
     order = np.argsort(rng.random((draws, len(among))), axis=1)
@@ -83,7 +88,7 @@ def left_out(
 
     Raises InputError if that leaves no label to measure.
     """
-    among = np.arange(len(reduction.labels)) if image is None else image_labels(reduction, image)[1]
+    among = _chosen_labels(reduction, image)
     if not 0 <= tied < len(among):
         raise InputError(f"{tied} labels tied: {len(among)} are there, so 0 to {len(among) - 1} can be")
     return _result(reduction, linear_labels(reduction), tied, settings, among)
@@ -97,7 +102,7 @@ def left_out_curve(
     progress: Progress | None = None,
 ) -> tuple[LeaveOutResult, ...]:
     """The errors for every number of labels tied, from none to all but one; nothing without labels."""
-    among = np.arange(len(reduction.labels)) if image is None else image_labels(reduction, image)[1]
+    among = _chosen_labels(reduction, image)
     labels, results = linear_labels(reduction), list[LeaveOutResult]()
     for tied in range(len(among)):
         results.append(_result(reduction, labels, tied, settings, among))

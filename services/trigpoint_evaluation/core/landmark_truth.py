@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 MATCH_LIMIT_M = 3.0  # the least spacing of separate poles; beyond it a landmark is nobody's
-CHI2_95_2DOF = 5.991  # 95 % of chi-squared with 2 degrees of freedom
+CHI2_95_2DOF = 5.991  # 95 % of chi-squared with 2 degrees of freedom: its root in sigmas is a 95 % ellipse's size
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""Poses between the keyframes of a path."""
+"""Poses between the keyframes of a path, its antenna and its length."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,11 @@ def _along_arc(start: Floats, end: Floats, share: Floats) -> Floats:
     cosine = np.where(small, 0.5 * angle, (1.0 - np.cos(safe)) / safe)
     step_m = np.column_stack([share * (sine * twist_x - cosine * twist_y), share * (cosine * twist_x + sine * twist_y)])
     return np.column_stack([transform_points(start, step_m), wrap_angles_rad(start[:, 2] + angle)])
+
+
+def path_length_m(pose: Floats) -> float:
+    """Length in m of a path through poses (n, 3)."""
+    return float(np.hypot(*np.diff(pose[:, :2], axis=0).T).sum())
 
 
 def antenna_points_m(trajectory: TrajectorySolved, at_ns: Ints) -> Floats:

@@ -14,6 +14,7 @@ from trigpoint.geodesy.projection import map_points_from_wgs84
 from trigpoint_evaluation.app import Evaluated, StampedPose, TruthEvaluation
 from trigpoint_evaluation.core.consistency import JudgedFixes, judged_fixes
 from trigpoint_evaluation.core.draws import LeaveOutResult
+from trigpoint_evaluation.core.paths import path_length_m
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -67,9 +68,7 @@ class DrivePicture:
     @property
     def length_m(self) -> float:
         """Length of the solved path, 0 without one."""
-        if self.solved is None:
-            return 0.0
-        return float(np.hypot(*np.diff(self.solved.pose[:, :2], axis=0).T).sum())
+        return 0.0 if self.solved is None else path_length_m(self.solved.pose)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

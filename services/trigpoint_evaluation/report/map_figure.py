@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from trigpoint.geodesy.uncertainty import ellipses_of
+from trigpoint_evaluation.core.landmark_truth import CHI2_95_2DOF
 from trigpoint_evaluation.report.content import AnchorPicture, DrivePicture
 from trigpoint_evaluation.report.style import (
     ANCHOR,
@@ -25,7 +26,6 @@ from trigpoint_evaluation.report.style import (
 
 Floats = NDArray[np.float64]
 
-CHI2_95_2DOF = 5.991  # a 95 % ellipse's semi-axes are sqrt of this many sigmas
 WIDTH_IN = 7.6
 PLOT_SHARE = 0.92  # of the width: the rest is the axis and its label
 HEIGHT_IN = (3.2, 7.6)
