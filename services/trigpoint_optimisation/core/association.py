@@ -6,13 +6,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from trigpoint.geodesy.poses import transform_points
 from trigpoint_optimisation.core.detection_noise import DetectionNoise, measured_noise
 from trigpoint_optimisation.core.fleet import Fleet, detections_in_map
 from trigpoint_optimisation.core.merging import LandmarkGroups, Tracks, voted_pairs
 from trigpoint_optimisation.core.preparation import PreparedDrive
 from trigpoint_optimisation.core.sightings import Sightings, drive_sightings, joined, keyframe_points
-from trigpoint_optimisation.core.single_sightings import VEHICLE, Seeing, SingleSightings, single_sightings
+from trigpoint_optimisation.core.single_sightings import (
+    VEHICLE,
+    Seeing,
+    SingleSightings,
+    sensor_poses,
+    single_sightings,
+)
 from trigpoint_optimisation.core.state import MapState
 from trigpoint_optimisation.core.tracklets import close_pairs, linked_tracks, seen_together
 from trigpoint_optimisation.settings import DetectionSettings
@@ -106,7 +111,7 @@ def tracks_in_map(fleet: Fleet, state: MapState, association: Association) -> Tr
 
     point = np.concatenate(detections_in_map(fleet, state))
     drive = np.concatenate([np.full(len(own), index) for index, own in enumerate(association.track)])
-    path = np.concatenate([_path_of_detections(fleet, index) for index in range(len(fleet.prepared))])
+    path = np.concatenate([each.motions.path.length_at(each.drive.detections.stamp_ns) for each in fleet.prepared])
     return Tracks(
         point_m=np.column_stack([mean(point[:, 0]), mean(point[:, 1])]),
         drive=mean(drive.astype(np.float64)).round().astype(np.int64),
@@ -114,14 +119,6 @@ def tracks_in_map(fleet: Fleet, state: MapState, association: Association) -> Tr
         kind=association.kind_of_track,
         apart=association.apart,
     )
-
-
-def _path_of_detections(fleet: Fleet, index: int) -> Floats:
-    each = fleet.prepared[index]
-    path, start_ns = each.motions.path, each.motions.path.stamp_ns[0]
-    at_s = (each.drive.detections.stamp_ns - start_ns) * 1e-9
-    along_m: Floats = np.interp(at_s, (path.stamp_ns - start_ns) * 1e-9, path.distance_m)
-    return along_m
 
 
 def first_association(fleet: Fleet, state: MapState) -> Association:
@@ -221,19 +218,17 @@ def with_measured_noise(fleet: Fleet, state: MapState, association: Association)
 
 def _measured_drive_noise(fleet: Fleet, index: int, state: MapState, landmark: Ints, track: Ints) -> DetectionNoise:
     each, rows = fleet.prepared[index], np.nonzero(_unless_camera(fleet.prepared[index], track) >= 0)[0]
-    keyframe, offset = each.detection_keyframe[rows], each.detection_offset[rows]
+    keyframe, scale = each.detection_keyframe[rows], fleet.frame.point_scale
     pose = state.drives[index].pose[keyframe]
     from_keyframe = state.landmark_m[landmark[track[rows]]] - pose[:, :2]
     c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
     expected = np.column_stack(
         [c * from_keyframe[:, 0] + s * from_keyframe[:, 1], c * from_keyframe[:, 1] - s * from_keyframe[:, 0]]
     )
-    described, scale = each.drive.described, fleet.frame.point_scale
-    mount = scale * np.array([described.landmark_sensor_x_m, described.landmark_sensor_y_m])
     return measured_noise(
         keyframe_points(each, point_scale=scale)[rows],
         expected,
-        transform_points(offset, np.broadcast_to(mount, (len(rows), 2))),
+        sensor_poses(each, point_scale=scale)[rows, :2],
         track[rows] * len(each.stamp_ns) + keyframe,
         fleet.noise[index],
     )

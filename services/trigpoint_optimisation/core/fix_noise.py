@@ -24,8 +24,7 @@ MOVED_M = 0.3  # a standing receiver repeats itself: such pairs say nothing of i
 
 def fix_residuals(prepared: PreparedDrive, state: DriveState) -> Floats:
     """Fix minus antenna (f, 2) in m, map frame, at the state's poses."""
-    offset = prepared.fix_offset
-    antenna = transform_points(offset, np.broadcast_to(state.antenna_m, (len(offset), 2)))
+    antenna = transform_points(prepared.fix_offset, state.antenna_m)
     residual: Floats = prepared.fix_m - transform_points(state.pose[prepared.fix_keyframe], antenna)
     return residual
 

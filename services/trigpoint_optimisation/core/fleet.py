@@ -72,7 +72,7 @@ def nominal_state(fleet: Fleet, pose: Sequence[Floats]) -> MapState:
                 pose=poses,
                 scale=np.array([scale, 1.0, 0.0]),
                 turn_bias=np.zeros(len(each.calibration.turn_bias)),
-                antenna_m=scale * np.array([each.drive.described.antenna_x_m, each.drive.described.antenna_y_m]),
+                antenna_m=each.nominal_antenna_m(scale),
                 fix_bias_m=np.zeros((len(fix_bias_stamps(each, fixes)), 2)),
                 sensor=np.zeros(6),
             )

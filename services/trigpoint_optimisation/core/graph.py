@@ -130,13 +130,12 @@ def add_calibration_priors(
     graph: gtsam.NonlinearFactorGraph, prepared: PreparedDrive, priors: CalibrationPriors, *, point_scale: float
 ) -> None:
     """Every calibration state held at its nominal value with its prior sigma; turn bias as a random walk."""
-    d, described = prepared.index, prepared.drive.described
+    d, arm_m = prepared.index, prepared.nominal_antenna_m(point_scale)
     turn_bias = turn_sigmas(prepared.source, priors)[1]
     sigmas = scale_sigmas(prepared, priors)
     diagonal = gtsam.noiseModel.Diagonal.Sigmas
     graph.add(gtsam.PriorFactorVector(scale_key(d), np.array([point_scale, 1.0, 0.0]), diagonal(sigmas)))
-    arm = point_scale * np.array([described.antenna_x_m, described.antenna_y_m])
-    graph.add(gtsam.PriorFactorVector(antenna_key(d), arm, diagonal(np.full(2, priors.antenna_m))))
+    graph.add(gtsam.PriorFactorVector(antenna_key(d), arm_m, diagonal(np.full(2, priors.antenna_m))))
     graph.add(gtsam.PriorFactorVector(sensor_key(d), np.zeros(6), diagonal(sensor_sigmas(prepared, priors))))
     graph.add(gtsam.PriorFactorVector(turn_bias_key(d, 0), np.zeros(1), diagonal(np.array([turn_bias]))))
     by_imu = prepared.source is TurnSource.IMU

@@ -74,6 +74,12 @@ class DeadReckonedPath:
         at_s = (stamp_ns - self.stamp_ns[0]) * 1e-9
         return np.column_stack([np.interp(at_s, t_s, self.pose[:, axis]) for axis in range(3)])
 
+    def length_at(self, stamp_ns: Ints) -> Floats:
+        """Path length (m,) in m since the start at any stamps (m,), interpolated, held at the ends."""
+        start_ns = self.stamp_ns[0]
+        length_m: Floats = np.interp((stamp_ns - start_ns) * 1e-9, (self.stamp_ns - start_ns) * 1e-9, self.distance_m)
+        return length_m
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motions:

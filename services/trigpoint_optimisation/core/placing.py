@@ -47,9 +47,7 @@ def placed_by_fixes(
 
 def _arms(prepared: PreparedDrive, point_scale: float) -> Floats:
     """The nominal antenna (f, 2) at each fix in its keyframe's frame, m."""
-    described = prepared.drive.described
-    arm = point_scale * np.array([described.antenna_x_m, described.antenna_y_m])
-    return transform_points(prepared.fix_offset, np.broadcast_to(arm, (len(prepared.fix_offset), 2)))
+    return transform_points(prepared.fix_offset, prepared.nominal_antenna_m(point_scale))
 
 
 def _antennas(prepared: PreparedDrive, pose: Floats, point_scale: float) -> Floats:
@@ -89,11 +87,10 @@ def _contradiction(prepared: PreparedDrive, pose: Floats, usable: Bools, point_s
 def _bent(prepared: PreparedDrive, allowed: Bools, *, point_scale: float) -> tuple[Floats, Bools]:
     """Keyframe poses (n, 3) bent to the allowed fixes (f,), and which fixes agree with one another."""
     rows = np.nonzero(allowed & prepared.fix_usable)[0]
-    described, path = prepared.drive.described, prepared.motions.path
-    arm = point_scale * np.array([described.antenna_x_m, described.antenna_y_m])
+    path, arm_m = prepared.motions.path, prepared.nominal_antenna_m(point_scale)
     fix_ns = prepared.drive.fixes.stamp_ns[rows]
     bent = bent_alignment(
-        path.at(fix_ns), arm, prepared.fix_m[rows], path_m=prepared.fix_path_m[rows], sigma_m=FIX_SIGMA_M
+        path.at(fix_ns), arm_m, prepared.fix_m[rows], path_m=prepared.fix_path_m[rows], sigma_m=FIX_SIGMA_M
     )
     start_ns = prepared.stamp_ns[0]
     fix_s, keyframe_s = (fix_ns - start_ns) * 1e-9, (prepared.stamp_ns - start_ns) * 1e-9

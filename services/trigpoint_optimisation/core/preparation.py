@@ -57,6 +57,10 @@ class PreparedDrive:
         """Whether the landmark sensor is a camera, which tells ranges by the size of things."""
         return self.drive.described.landmark_sensor_model == CAMERA
 
+    def nominal_antenna_m(self, point_scale: float) -> Floats:
+        """The lever arm (2,) of the antenna as described: x, y in map metres, base frame."""
+        return point_scale * np.array([self.drive.described.antenna_x_m, self.drive.described.antenna_y_m])
+
     def hung(self, stamp_ns: Ints) -> tuple[Ints, Floats]:
         """The keyframe (m,) before each stamp and the base's pose (m, 3) at the stamp in its frame."""
         keyframe, offset, _ = _hung(self.motions.path, self.stamp_ns, stamp_ns)
@@ -157,7 +161,7 @@ def prepared_drive(
         stamp_ns=keyframe_ns,
         motions=motions,
         fix_m=map_points_from_wgs84(fixes.lat_deg, fixes.lon_deg, frame),
-        fix_path_m=_path_length_at(motions.path, fixes.stamp_ns),
+        fix_path_m=motions.path.length_at(fixes.stamp_ns),
         fix_usable=fix_covered,
         fix_keyframe=fix_keyframe,
         fix_offset=fix_offset,
@@ -165,12 +169,6 @@ def prepared_drive(
         detection_keyframe=keyframe,
         detection_offset=offset,
     )
-
-
-def _path_length_at(path: DeadReckonedPath, stamp_ns: Ints) -> Floats:
-    start_ns = path.stamp_ns[0]
-    length_m: Floats = np.interp((stamp_ns - start_ns) * 1e-9, (path.stamp_ns - start_ns) * 1e-9, path.distance_m)
-    return length_m
 
 
 def detected_points(prepared: PreparedDrive, *, point_scale: float) -> Floats:

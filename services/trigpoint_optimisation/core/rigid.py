@@ -101,7 +101,7 @@ def _group_alignment(fleet: Fleet, state: MapState, group: tuple[int, ...]) -> R
     antenna, fix = [], []
     for d in group:
         each, rows = fleet.prepared[d], np.nonzero(fleet.trusted[d])[0]
-        arm = transform_points(each.fix_offset[rows], np.broadcast_to(state.drives[d].antenna_m, (len(rows), 2)))
+        arm = transform_points(each.fix_offset[rows], state.drives[d].antenna_m)
         antenna.append(transform_points(state.drives[d].pose[each.fix_keyframe[rows]], arm))
         fix.append(each.fix_m[rows])
     try:

@@ -53,13 +53,11 @@ def _calibration(prepared: PreparedDrive, calibration: Floats) -> OdometryCalibr
 
 
 def _hung_fixes(prepared: PreparedDrive, usable: Bools, point_scale: float) -> HungFixes:
-    described, edges = prepared.drive.described, SAMPLED_SELECTION_EDGES
-    arm = point_scale * np.array([described.antenna_x_m, described.antenna_y_m])
-    offset = prepared.fix_offset[usable]
+    edges = SAMPLED_SELECTION_EDGES
     return HungFixes(
         fix_m=prepared.fix_m[usable],
         keyframe=prepared.fix_keyframe[usable],
-        antenna_m=transform_points(offset, np.broadcast_to(arm, (len(offset), 2))),
+        antenna_m=transform_points(prepared.fix_offset[usable], prepared.nominal_antenna_m(point_scale)),
         sigma_m=edges.sigma_m,
         cauchy_m=edges.kernel.sigmas * edges.sigma_m,
         slow_m=edges.bias_sigma_m,

@@ -45,7 +45,7 @@ def sensor_poses(prepared: PreparedDrive, *, point_scale: float) -> Floats:
     described, offset = prepared.drive.described, prepared.detection_offset
     mount = point_scale * np.array([described.landmark_sensor_x_m, described.landmark_sensor_y_m])
     heading = offset[:, 2] + described.landmark_sensor_yaw_rad
-    return np.column_stack([transform_points(offset, np.broadcast_to(mount, (len(offset), 2))), heading])
+    return np.column_stack([transform_points(offset, mount), heading])
 
 
 def sighting_sigmas(prepared: PreparedDrive, settings: DetectionSettings) -> Floats:
