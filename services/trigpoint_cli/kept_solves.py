@@ -33,7 +33,7 @@ def kept_of(solution: Solution) -> KeptSolve:
     """What is worth keeping of a solution."""
     return KeptSolve(
         landmarks=tuple(one.landmark for one in solution.map.landmarks),
-        joint_covariance_m2=solution.landmark_covariance,
+        joint_covariance_m2=solution.landmark_covariance_m2,
         reduction=solution.reduction(),
     )
 

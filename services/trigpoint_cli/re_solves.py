@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from trigpoint.events.solved import LabelReduction
 from trigpoint_evaluation.core.leave_out import held_out_of, held_out_residuals_m, linear_labels
 from trigpoint_evaluation.core.summary import ErrorSummary, summary_of
-from trigpoint_optimisation.core.anchoring import UNASSIGNED
+from trigpoint_optimisation.core.anchoring import UNASSIGNED, image_shifts_m
 from trigpoint_optimisation.core.fleet import solved_state
 from trigpoint_optimisation.core.stages import Solved, full_graph
 
@@ -52,7 +52,7 @@ def _full_residuals_m(solved: Solved, reduction: LabelReduction, tied: Ints, hel
     landmark[rows[tied]] = solved.assignment.landmark[rows[tied]]
     chosen = replace(solved, assignment=replace(solved.assignment, landmark=landmark))
     state = solved_state(full_graph(chosen), solved.state)
-    shift_m = np.vstack([state.image_m, np.zeros((1, 2))])[solved.labels.image[rows[held_out]]]
+    shift_m = image_shifts_m(solved.labels, state.image_m)[rows[held_out]]
     predicted_m = state.landmark_m[solved.assignment.landmark[rows[held_out]]] + shift_m
     residual_m: Floats = solved.labels.label_m[rows[held_out]] - predicted_m
     return residual_m

@@ -2,7 +2,6 @@
 
 import logging
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from hashlib import blake2b
 
@@ -21,17 +20,15 @@ from trigpoint.logs.readings import (
     logged_verdicts,
     vehicle_streams,
 )
+from trigpoint_optimisation.core.fleet import Progress
 from trigpoint_optimisation.core.solve import Solution, solve_map
+from trigpoint_optimisation.core.stages import in_silence
 from trigpoint_optimisation.settings import SolveSettings, settings_json
 
 logger = logging.getLogger(__name__)
 
 SOURCE = "optimisation"
 STREAM = STREAM_PATTERNS[MapSolved]
-
-
-def in_silence(stage: str, part: float) -> None:
-    """Progress for nobody."""
 
 
 def input_positions(log: EventLog) -> tuple[tuple[str, int], ...]:
@@ -47,7 +44,7 @@ def newest_version(log: EventLog) -> int:
     return max(versions, default=0)
 
 
-def build(log: EventLog, settings: SolveSettings, *, progress: Callable[[str, float], None] = in_silence) -> Solution:
+def build(log: EventLog, settings: SolveSettings, *, progress: Progress = in_silence) -> Solution:
     """The next map version solved from everything the log holds, and appended with its number and inputs.
 
     Raises InputError where the log has no drives or frame, AlignmentRefused where they fix no map, AppendFailed.

@@ -143,25 +143,30 @@ def nearest_assignment(
     return Assignment(landmark=landmark, reason=tuple(reason))
 
 
-def tied_labels(labels: Labels, assignment: Assignment) -> tuple[TiedLabels, Ints]:
-    """The assigned labels ready for the graph, and which labels (indices) they are."""
+def tied_labels(labels: Labels, assignment: Assignment) -> TiedLabels:
+    """The assigned labels ready for the graph."""
     rows = np.nonzero(assignment.landmark >= 0)[0]
-    tied = TiedLabels(
+    return TiedLabels(
         landmark=assignment.landmark[rows],
         label_m=labels.label_m[rows],
         sigma_m=labels.sigma_m[rows],
         image=labels.image[rows],
         image_sigma_m=labels.image_sigma_m,
     )
-    return tied, rows
+
+
+def image_shifts_m(labels: Labels, image_m: Floats) -> Floats:
+    """The offset (a, 2) of each label's image; zero where it has none."""
+    shift_m: Floats = np.vstack([image_m, np.zeros((1, 2))])[labels.image]
+    return shift_m
 
 
 def residuals_m(labels: Labels, assignment: Assignment, landmark_m: Floats, image_m: Floats) -> Floats:
     """Label minus landmark minus its image's offset (a, 2); NaN where unassigned."""
     residual = np.full((len(labels.name), 2), np.nan)
     rows = np.nonzero(assignment.landmark >= 0)[0]
-    padded = np.vstack([image_m, np.zeros((1, 2))])
-    residual[rows] = labels.label_m[rows] - landmark_m[assignment.landmark[rows]] - padded[labels.image[rows]]
+    shift_m = image_shifts_m(labels, image_m)
+    residual[rows] = labels.label_m[rows] - landmark_m[assignment.landmark[rows]] - shift_m[rows]
     return residual
 
 

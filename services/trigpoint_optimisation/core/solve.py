@@ -24,8 +24,8 @@ from trigpoint_optimisation.core.preparation import PreparedDrive
 from trigpoint_optimisation.core.stages import (
     Solved,
     full_graph,
+    in_silence,
     landmark_signatures,
-    quiet,
     reduced_landmarks,
     solve_fleet,
 )
@@ -67,15 +67,21 @@ class Solution:
     solved: Solved
 
     @cached_property
-    def landmark_covariance(self) -> Floats:
-        """Joint covariance (2l, 2l) of all landmarks in m^2, x and y of each in turn, in order of `map.landmarks`."""
+    def joint_covariance_m2(self) -> Floats:
+        """Joint covariance (2l + 2k, 2l + 2k) of all landmarks, in order of `map.landmarks`, and image offsets: x and y
+        of each in turn."""
+        return covariance_of(reduced_landmarks(self.solved))
+
+    @property
+    def landmark_covariance_m2(self) -> Floats:
+        """Joint covariance (2l, 2l) of all landmarks alone."""
         count = 2 * self.solved.association.landmark_count
-        return covariance_of(reduced_landmarks(self.solved))[:count, :count]
+        return self.joint_covariance_m2[:count, :count]
 
     @cached_property
     def map(self) -> SolvedMap:
         """The map as events of version UNNUMBERED, without wall time and inputs."""
-        return _solved_map(self.solved, landmark_covariance=self.landmark_covariance)
+        return _solved_map(self.solved, joint_covariance_m2=self.joint_covariance_m2)
 
     @property
     def left_out(self) -> tuple[LeftOut, ...]:
@@ -94,7 +100,7 @@ def solve_map(
     settings: SolveSettings,
     *,
     verdicts: Sequence[FixJudged] | None = None,
-    progress: Progress = quiet,
+    progress: Progress = in_silence,
 ) -> Solution:
     """The map of all drives by the settings' method; with `verdicts`, no fix that the filter contradicts takes
     part, unless edges are close.
@@ -125,8 +131,8 @@ def usable_fixes(drive: Drive, verdicts: Sequence[FixJudged]) -> Bools:
     return usable if not len(usable) or usable.mean() >= BELIEVED_SHARE else np.ones_like(usable)
 
 
-def _solved_map(solved: Solved, *, landmark_covariance: Floats) -> SolvedMap:
-    landmarks = _landmarks(solved, landmark_covariance)
+def _solved_map(solved: Solved, *, joint_covariance_m2: Floats) -> SolvedMap:
+    landmarks = _landmarks(solved, joint_covariance_m2)
     anchors = _anchors(solved, tuple(landmark.landmark for landmark in landmarks))
     head = MapSolved(
         map_version=UNNUMBERED,
@@ -138,7 +144,11 @@ def _solved_map(solved: Solved, *, landmark_covariance: Floats) -> SolvedMap:
         wall_s=0.0,
     )
     return SolvedMap(
-        head=head, trajectories=_trajectories(solved), landmarks=landmarks, anchors=anchors, images=_images(solved)
+        head=head,
+        trajectories=_trajectories(solved),
+        landmarks=landmarks,
+        anchors=anchors,
+        images=_images(solved, joint_covariance_m2),
     )
 
 
@@ -290,11 +300,9 @@ def _anchors(solved: Solved, landmark: Sequence[str]) -> tuple[AnchorAssociated,
     )
 
 
-def _images(solved: Solved) -> tuple[ImageOffsetSolved, ...]:
-    if not solved.labels.images:
-        return ()
+def _images(solved: Solved, joint_covariance_m2: Floats) -> tuple[ImageOffsetSolved, ...]:
     count = 2 * solved.association.landmark_count
-    covariance = covariance_of(reduced_landmarks(solved))[count:, count:]
+    covariance = joint_covariance_m2[count:, count:]
     return tuple(
         ImageOffsetSolved(
             map_version=UNNUMBERED,

@@ -15,6 +15,7 @@ from trigpoint_optimisation.core.anchoring import (
     Assignment,
     Labels,
     by_signature,
+    image_shifts_m,
     labels_of,
     nearest_assignment,
     residuals_m,
@@ -74,8 +75,8 @@ class Solved:
     left_out: tuple[LeftOut, ...] = ()
 
 
-def quiet(stage: str, part: float) -> None:
-    """A progress listener that does nothing."""
+def in_silence(stage: str, part: float) -> None:
+    """Progress for nobody."""
 
 
 def solve_fleet(
@@ -85,7 +86,7 @@ def solve_fleet(
     settings: SolveSettings,
     *,
     allowed: Sequence[Bools] | None = None,
-    progress: Progress = quiet,
+    progress: Progress = in_silence,
 ) -> Solved:
     """The fleet solved by the settings' method; `allowed` (f,) per drive says which fixes may be used.
 
@@ -200,8 +201,7 @@ def full_graph(
     add_sightings(graph, seen.sightings, seen.landmark, kernel=settings.fixes.landmark_kernel)
     add_single_sightings(graph, seen.singles, kernel=single_kernel or settings.detections.single_kernel)
     if with_labels:
-        tied, _ = tied_labels(solved.labels, solved.assignment)
-        add_labels(graph, tied)
+        add_labels(graph, tied_labels(solved.labels, solved.assignment))
     return graph
 
 
@@ -252,8 +252,8 @@ def renewed_assignment(solved: Solved) -> Assignment:
         assignment = by_signature(labels, landmark_signatures(solved))
     else:
         sigma = _expected_sigma(solved)
-        shift = np.vstack([state.image_m, np.zeros((1, 2))])[labels.image]
-        assignment = nearest_assignment(labels, state.landmark_m, shift_m=shift, sigma_m=sigma, settings=settings)
+        shift_m = image_shifts_m(labels, state.image_m)
+        assignment = nearest_assignment(labels, state.landmark_m, shift_m=shift_m, sigma_m=sigma, settings=settings)
     residual = residuals_m(labels, assignment, state.landmark_m, state.image_m)
     limit_sigmas = settings.outlier_sigmas
     return without_outliers(assignment, solved.assignment, residual, _residual_sigma(solved), limit_sigmas=limit_sigmas)
@@ -266,7 +266,7 @@ def _expected_sigma(solved: Solved) -> Floats:
     covariance = covariance_of(reduction)
     variance = np.diag(covariance).reshape(-1, 2).max(axis=1)
     labels = solved.labels
-    expected = labels.label_m - np.vstack([solved.state.image_m, np.zeros((1, 2))])[labels.image]
+    expected = labels.label_m - image_shifts_m(labels, solved.state.image_m)
     distance = np.hypot(*(expected[:, None, :] - solved.state.landmark_m[None, :, :]).transpose(2, 0, 1))
     image = np.append(variance[count:], 0.0)[labels.image]
     expected_m2 = variance[:count][distance.argmin(axis=1)] + image + labels.sigma_m**2

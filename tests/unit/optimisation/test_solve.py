@@ -13,7 +13,7 @@ from trigpoint.events.estimated import FixJudged
 from trigpoint_optimisation.core.anchoring import Assignment, labels_of
 from trigpoint_optimisation.core.fleet import solved_state
 from trigpoint_optimisation.core.solve import Solution, solve_map, usable_fixes
-from trigpoint_optimisation.core.stages import Solved, anchored, full_graph, quiet, solve_fleet
+from trigpoint_optimisation.core.stages import Solved, anchored, full_graph, in_silence, solve_fleet
 from trigpoint_optimisation.core.state import MapState
 from trigpoint_optimisation.settings import OdometrySettings, SolveSettings
 
@@ -35,7 +35,7 @@ def loose(block: World) -> Solved:
 
 
 def with_labels(loose: Solved, anchors: Sequence[AnchorLabelled], *, image_offsets: bool = True) -> Solved:
-    return anchored(loose, labels_of(anchors, FRAME, image_offsets=image_offsets), progress=quiet)
+    return anchored(loose, labels_of(anchors, FRAME, image_offsets=image_offsets), progress=in_silence)
 
 
 @pytest.fixture(scope="module")
@@ -122,12 +122,12 @@ def test_one_strong_anchor_at_least_halves_its_landmarks_error(block: World, loo
 
 def test_landmark_errors_are_as_large_as_their_covariances_say(tied: Solved, block: World) -> None:
     error = errors_m(tied.state, block).ravel()
-    nees = error @ np.linalg.solve(Solution(solved=tied).landmark_covariance, error) / len(error)
+    nees = error @ np.linalg.solve(Solution(solved=tied).landmark_covariance_m2, error) / len(error)
     assert 0.4 < nees < 1.6  # 82 degrees of freedom: 1 with a sigma of 0.16, and noise measured, not given
 
 
 def test_the_loose_map_knows_how_little_it_knows(loose: Solved, block: World) -> None:
-    sigma_m = np.sqrt(np.trace(Solution(solved=loose).landmark_covariance) / 41.0)
+    sigma_m = np.sqrt(np.trace(Solution(solved=loose).landmark_covariance_m2) / 41.0)
     assert mean_error_m(loose, block) / 3.0 < sigma_m < 3.0 * mean_error_m(loose, block)
 
 
