@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trigpoint.geodesy.poses import wrap_angles_rad
+from trigpoint_optimisation.core.robust_scale import robust_sigma
 from trigpoint_optimisation.settings import DetectionSettings
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-SIGMAS_PER_MAD = 1.4826  # of a normal distribution
 RANGE_LIMITS_M = (0.02, 0.5)
 BEARING_LIMITS_RAD = (0.001, 0.05)
 COMMON_LIMITS_M = (0.01, 0.5)
@@ -39,7 +39,7 @@ def nominal_noise(settings: DetectionSettings) -> DetectionNoise:
 
 
 def _clipped_mad(values: Floats, limits: tuple[float, float]) -> float:
-    return float(np.clip(SIGMAS_PER_MAD * np.median(np.abs(values)), *limits))
+    return float(np.clip(robust_sigma(values), *limits))
 
 
 def measured_noise(
@@ -48,7 +48,7 @@ def measured_noise(
     """The noise that detections (n, 2) show against their landmarks (n, 2), all in their keyframes' frames.
 
     sensor_m (n, 2): where the sensor was; group (n,): the sighting each detection is part of. Medians throughout, so
-    that wrong associations do not count (Rousseeuw and Croux 1993).
+    that wrong associations do not count.
     """
     if len(detected_m) < MIN_DETECTIONS:
         return nominal

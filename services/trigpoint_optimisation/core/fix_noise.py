@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from trigpoint.geodesy.poses import transform_points
 from trigpoint_optimisation.core.preparation import PreparedDrive
+from trigpoint_optimisation.core.robust_scale import robust_sigma
 from trigpoint_optimisation.core.state import DriveState
 from trigpoint_optimisation.settings import FixSettings
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-SIGMAS_PER_MAD = 1.4826  # of a normal distribution
 WHITE_MOST_M = 5.0
 WHITE_LEAST_SHARE = 0.5  # of the slow sigma: a slow error that slides faster than the model must not bend the path
 SLOW_MOST_M = 8.0
@@ -34,9 +34,9 @@ def measured_fix_settings(
 ) -> FixSettings:
     """The fix settings with white and slow sigma as the drive's residuals show them.
 
-    White from differences of neighbouring fixes, slow from what the residuals have beyond it, by medians (Rousseeuw
-    and Croux 1993). The fitted path follows the slow error and hides most of it, and all of its duration: the slow
-    sigma is never below the given one, and the given time stays.
+    White from differences of neighbouring fixes, slow from what the residuals have beyond it, by medians. The fitted
+    path follows the slow error and hides most of it, and all of its duration: the slow sigma is never below the given
+    one, and the given time stays.
     """
     rows = np.nonzero(trusted)[0]
     residual = fix_residuals(prepared, state)[rows]
@@ -45,15 +45,11 @@ def measured_fix_settings(
     near = (np.diff(stamp_s) <= NEIGHBOUR_S) & (np.diff(path_m) > MOVED_M)
     if near.sum() < MIN_PAIRS:
         return fixes
-    white = _sigma(np.diff(residual, axis=0)[near]) / np.sqrt(2.0)
-    total = _sigma(residual)
+    white = robust_sigma(np.diff(residual, axis=0)[near]) / np.sqrt(2.0)
+    total = robust_sigma(residual)
     slow_m = float(np.clip(np.sqrt(max(total**2 - white**2, 0.0)), fixes.bias_sigma_m, SLOW_MOST_M))
     return replace(
         fixes,
         sigma_m=float(np.clip(white, WHITE_LEAST_SHARE * slow_m, WHITE_MOST_M)),
         bias_sigma_m=slow_m,
     )
-
-
-def _sigma(values: Floats) -> float:
-    return SIGMAS_PER_MAD * float(np.median(np.abs(values)))

@@ -73,7 +73,7 @@ def nominal_state(fleet: Fleet, pose: Sequence[Floats]) -> MapState:
                 scale=np.array([scale, 1.0, 0.0]),
                 turn_bias=np.zeros(len(each.calibration.turn_bias)),
                 antenna_m=each.nominal_antenna_m(scale),
-                fix_bias_m=np.zeros((len(fix_bias_stamps(each, fixes)), 2)),
+                fix_bias_m=_no_fix_bias(each, fixes),
                 sensor=np.zeros(6),
             )
             for each, poses, fixes in zip(fleet.prepared, pose, fleet.fixes, strict=True)
@@ -112,17 +112,27 @@ def recalibrated(fleet: Fleet, state: MapState) -> Fleet:
     return replace(fleet, prepared=tuple(prepared))
 
 
+def without_fix_bias(fleet: Fleet, state: MapState) -> MapState:
+    """The state with the slow error of fixes at zero, at as many knots as the fleet's fixes have."""
+    drives = tuple(
+        replace(drive, fix_bias_m=_no_fix_bias(each, fixes))
+        for each, drive, fixes in zip(fleet.prepared, state.drives, fleet.fixes, strict=True)
+    )
+    return replace(state, drives=drives)
+
+
+def _no_fix_bias(prepared: PreparedDrive, fixes: FixSettings) -> Floats:
+    return np.zeros((len(fix_bias_stamps(prepared, fixes)), 2))
+
+
 def with_measured_fixes(fleet: Fleet, state: MapState) -> tuple[Fleet, MapState]:
     """The fleet with the noise of each drive's fixes as its residuals show it, and the state resized for it."""
     fixes = tuple(
         measured_fix_settings(each, drive, trusted, own)
         for each, drive, trusted, own in zip(fleet.prepared, state.drives, fleet.trusted, fleet.fixes, strict=True)
     )
-    drives = tuple(
-        replace(drive, fix_bias_m=np.zeros((len(fix_bias_stamps(each, own)), 2)))
-        for each, drive, own in zip(fleet.prepared, state.drives, fixes, strict=True)
-    )
-    return replace(fleet, fixes=fixes), replace(state, drives=drives)
+    fleet = replace(fleet, fixes=fixes)
+    return fleet, without_fix_bias(fleet, state)
 
 
 def motion_graph(fleet: Fleet) -> gtsam.NonlinearFactorGraph:

@@ -16,8 +16,8 @@ from trigpoint_optimisation.core.fleet import (
     solved_state,
     with_measured_fixes,
     with_poses,
+    without_fix_bias,
 )
-from trigpoint_optimisation.core.graph import fix_bias_stamps
 from trigpoint_optimisation.core.odometry import TurnSource
 from trigpoint_optimisation.core.placing import placed_by_fixes
 from trigpoint_optimisation.core.sampled_placing import sampled_path, wrapped_pose
@@ -99,19 +99,8 @@ def _weakly_solved(fleet: Fleet, state: MapState, *, robust: bool) -> MapState:
         for each in fleet.prepared
     )
     weak = replace(fleet, fixes=edges)
-    bare = replace(
-        state,
-        drives=tuple(
-            replace(drive, fix_bias_m=np.zeros((len(fix_bias_stamps(each, own)), 2)))
-            for drive, each, own in zip(state.drives, fleet.prepared, edges, strict=True)
-        ),
-    )
-    found = solved_state(georeferenced_graph(weak, robust=robust), bare)
-    drives = tuple(
-        replace(drive, fix_bias_m=np.zeros_like(old.fix_bias_m))
-        for drive, old in zip(found.drives, state.drives, strict=True)
-    )
-    return replace(found, drives=drives)
+    found = solved_state(georeferenced_graph(weak, robust=robust), without_fix_bias(weak, state))
+    return without_fix_bias(fleet, found)
 
 
 def _selected(fleet: Fleet, state: MapState, allowed: tuple[Bools, ...]) -> tuple[Fleet, MapState]:

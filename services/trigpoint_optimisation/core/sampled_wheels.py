@@ -7,12 +7,13 @@ balancing vehicle, shows as slow turns that never were (aliasing).
 import numpy as np
 from numpy.typing import NDArray
 
+from trigpoint_optimisation.core.robust_scale import robust_sigma
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 COARSE_S = 0.5  # s: a walking pace vehicle begins and ends a turn within one or two seconds
 MOVING_MPS = 0.3  # m/s: slower, a vehicle is as good as standing and its wheels say nothing of its wobble
-SIGMAS_PER_MAD = 1.4826  # of a normal distribution
 SECOND_DIFFERENCE = np.sqrt(6.0)  # sigma of w[i-1] - 2 w[i] + w[i+1] by sigma of white w
 SMOOTHING = (0.25, 0.5, 0.25)  # weights of neighbouring samples: nothing is left of what alternates
 MIN_SAMPLES = 20  # fewer second differences have no median worth the name
@@ -35,7 +36,7 @@ def wobble_radps(yaw_rate_radps: Floats, speed_mps: Floats) -> float:
     change = change[speed_mps[1:-1] > MOVING_MPS]
     if len(change) < MIN_SAMPLES:
         return 0.0
-    return SIGMAS_PER_MAD * float(np.median(np.abs(change))) / float(SECOND_DIFFERENCE)
+    return robust_sigma(change) / float(SECOND_DIFFERENCE)
 
 
 def without_wobble(yaw_rate_radps: Floats, sigma_radps: float) -> Floats:

@@ -87,8 +87,8 @@ def seen_together(track: Ints, stamp_ns: Ints) -> frozenset[tuple[int, int]]:
     if not len(rows):
         return frozenset()
     sweep = np.unique(stamp_ns[rows], return_inverse=True)[1]
-    tree_like = np.argsort(sweep, kind="stable")
-    ordered, sweep = track[rows][tree_like], sweep[tree_like]
+    by_sweep = np.argsort(sweep, kind="stable")
+    ordered, sweep = track[rows][by_sweep], sweep[by_sweep]
     pairs = []
     for offset in range(1, int(np.bincount(sweep).max())):
         same = sweep[offset:] == sweep[:-offset]
