@@ -4,6 +4,7 @@ Nothing here is truth: without it the same is solved again from the log.
 """
 
 import zipfile
+import zlib
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -18,6 +19,8 @@ from trigpoint_optimisation.core.solve import Solution
 Floats = NDArray[np.float64]
 
 NAMES = ("landmarks", "labels", "images")  # the reduction's fields that are text
+PREFIX = "reduction_"  # of the reduction's arrays in the file
+WRITTEN = ("landmarks", "joint_covariance_m2", *(f"{PREFIX}{field.name}" for field in fields(LabelReduction)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +44,7 @@ def kept_of(solution: Solution) -> KeptSolve:
 def keep(data: DataDirectory, map_version: int, kept: KeptSolve) -> None:
     """Kept under its map version. Raises InputError if it cannot be written."""
     path = _path(data, map_version)
-    reduction = {f"reduction_{field.name}": getattr(kept.reduction, field.name) for field in fields(LabelReduction)}
+    reduction = {f"{PREFIX}{field.name}": getattr(kept.reduction, field.name) for field in fields(LabelReduction)}
     arrays = {"landmarks": kept.landmarks, "joint_covariance_m2": kept.joint_covariance_m2, **reduction}
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -58,10 +61,10 @@ def kept_solve(data: DataDirectory, map_version: int) -> KeptSolve | None:
         return None
     try:
         with path.open("rb") as file, np.load(file) as arrays:
-            found = {name: arrays[name] for name in arrays.files}
-    except (OSError, ValueError, zipfile.BadZipFile):
-        return None  # half written: it is solved again
-    parts = {field.name: found[f"reduction_{field.name}"] for field in fields(LabelReduction)}
+            found = {name: arrays[name] for name in WRITTEN}
+    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error):
+        return None  # half written, damaged or another version's: it is solved again
+    parts = {field.name: found[f"{PREFIX}{field.name}"] for field in fields(LabelReduction)}
     texts = {name: tuple(parts[name].tolist()) for name in NAMES}
     return KeptSolve(
         landmarks=tuple(found["landmarks"].tolist()),

@@ -2,6 +2,7 @@ from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from evaluated_maps.examples import solved_example
 from trigpoint.events.solved import LabelReduction
@@ -29,11 +30,33 @@ def test_nothing_kept_is_nothing_found(tmp_path: Path) -> None:
     assert kept_solve(DataDirectory(tmp_path), 1) is None
 
 
-def test_a_file_half_written_is_as_none(tmp_path: Path) -> None:
-    data = DataDirectory(tmp_path)
+def kept_file(data: DataDirectory) -> Path:
+    """The file of map version 1."""
     keep(data, 1, kept_example())
     (path,) = data.solves.iterdir()
-    path.write_bytes(path.read_bytes()[:1000])
+    return path
+
+
+@pytest.mark.parametrize("size", [0, 1000])
+def test_a_file_half_written_is_as_none(size: int, tmp_path: Path) -> None:
+    data = DataDirectory(tmp_path)
+    path = kept_file(data)
+    path.write_bytes(path.read_bytes()[:size])
+    assert kept_solve(data, 1) is None
+
+
+def test_a_damaged_file_is_as_none(tmp_path: Path) -> None:
+    data = DataDirectory(tmp_path)
+    path = kept_file(data)
+    whole = path.read_bytes()
+    path.write_bytes(whole[:60] + b"\xff" * 200 + whole[260:])
+    assert kept_solve(data, 1) is None
+
+
+def test_a_file_without_what_is_kept_today_is_as_none(tmp_path: Path) -> None:
+    data = DataDirectory(tmp_path)
+    with kept_file(data).open("wb") as file:
+        np.savez_compressed(file, landmarks=np.array(["lm-1"]))
     assert kept_solve(data, 1) is None
 
 
