@@ -1,5 +1,6 @@
 """`trigpoint demo`: a simulated campus, from raw logs to a georeferenced map, its errors and its report."""
 
+import os
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -86,7 +87,8 @@ def _emptied(out: Path) -> DataDirectory:
         raise InputError(f"{out}: the directory is not empty and not a demonstration's; choose another --out")
     try:
         for made in (data.log, data.vehicles, data.solves, data.truth.parent):
-            shutil.rmtree(made, ignore_errors=True)
+            if os.path.lexists(made):
+                shutil.rmtree(made)
         for file in (data.report, data.anchors, *out.glob(f"{data.database.name}*")):
             file.unlink(missing_ok=True)
         out.mkdir(parents=True, exist_ok=True)

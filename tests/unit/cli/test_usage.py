@@ -81,6 +81,17 @@ def test_a_demonstration_does_not_empty_somebody_else_s_directory(tmp_path: Path
     assert (tmp_path / "thesis.tex").read_text() == "years of work"
 
 
+def test_a_demonstration_is_not_mixed_with_an_earlier_one_that_cannot_be_emptied(tmp_path: Path) -> None:
+    out, elsewhere = tmp_path / "demo", tmp_path / "elsewhere"
+    out.mkdir()
+    elsewhere.mkdir()
+    (out / "trigpoint-demo").touch()
+    (out / "log").symlink_to(elsewhere)  # what is behind a link is not removed
+    said = trigpoint("demo", "--out", out, "--json")
+    assert said.status == 2
+    assert f"{out}: cannot be written" in said.answer["error"]
+
+
 def test_near_without_a_radius_is_refused(tmp_path: Path) -> None:
     said = trigpoint("landmarks", "--data", tmp_path, "--near", "0,0", "--json")
     assert said.status == 2
