@@ -4,13 +4,14 @@ import errno
 import importlib
 import json
 import logging
+import os
 import sys
 from collections.abc import Sequence
 
 import click
 
 from trigpoint.errors import InputError, TrigpointError
-from trigpoint_cli.output import CommandIncomplete, use_parsed_output
+from trigpoint_cli.output import CommandIncomplete
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
 FULL_DISK = (errno.ENOSPC, errno.EDQUOT)
@@ -67,8 +68,7 @@ def trigpoint(debug: bool) -> None:
 def run(words: Sequence[str]) -> int:
     """The exit status of the command with these words."""
     try:
-        with use_parsed_output():
-            trigpoint.main(args=list(words), prog_name="trigpoint", standalone_mode=False)
+        trigpoint.main(args=list(words), prog_name="trigpoint", standalone_mode=False)
         return OK
     except Exception as error:
         if "--debug" in words:
@@ -82,7 +82,10 @@ def _ended(error: Exception, *, as_json: bool) -> int:
     click.echo(f"trigpoint: {line}", err=True)
     if as_json:
         answer = error.answer if isinstance(error, CommandIncomplete) else {}
-        click.echo(json.dumps({**answer, "error": line, "exit_status": status}))
+        try:
+            click.echo(json.dumps({**answer, "error": line, "exit_status": status}))
+        except BrokenPipeError:  # nobody reads any more; standard error has said it
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return status
 
 

@@ -111,29 +111,15 @@ def answering(function: Callable[..., Answer]) -> Callable[..., None]:
         values = {**answer.values, "wall_s": round(time.perf_counter() - began_s, 3)}
         for complaint in answer.complaints[1:]:
             click.echo(f"trigpoint: {complaint}", err=True)
+        if not as_json:
+            for line in answer.lines:
+                click.echo(line)
         if answer.complaints:
-            _say(answer, {}, as_json=False) if not as_json else None
             raise CommandIncomplete(answer.complaints, plain(values))
-        _say(answer, values, as_json=as_json)
+        if as_json:
+            click.echo(json.dumps(plain(values), allow_nan=False))
 
     return command
-
-
-def _say(answer: Answer, values: JsonObject, *, as_json: bool) -> None:
-    if as_json:
-        click.echo(json.dumps(plain(values), allow_nan=False))
-    else:
-        for line in answer.lines:
-            click.echo(line)
-
-
-@contextmanager
-def use_parsed_output() -> Iterator[None]:
-    """Standard output that a closed pipe (`| head`) ends quietly."""
-    try:
-        yield
-    except BrokenPipeError:
-        sys.stderr.close()
 
 
 def plain(value: Any) -> Any:

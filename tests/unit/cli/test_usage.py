@@ -1,3 +1,6 @@
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -90,6 +93,16 @@ def test_a_demonstration_is_not_mixed_with_an_earlier_one_that_cannot_be_emptied
     said = trigpoint("demo", "--out", out, "--json")
     assert said.status == 2
     assert f"{out}: cannot be written" in said.answer["error"]
+
+
+def test_an_error_nobody_reads_the_json_of_is_still_one_line_and_its_status() -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    program = "from trigpoint_cli.app import main; main()"
+    command = (sys.executable, "-c", program, "build", "--data", NOTHING, "--json")
+    ended = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writer)
+    assert (ended.returncode, ended.stderr.count("\n")) == (2, 1)
 
 
 def test_near_without_a_radius_is_refused(tmp_path: Path) -> None:
