@@ -1,4 +1,4 @@
-"""What can be chosen about a solve; every number has a unit in its name and a source beside it."""
+"""What can be chosen about a solve; units stand in names, and what a number is of beside it or in its class's text."""
 
 import json
 from dataclasses import asdict, dataclass, field, replace
@@ -89,7 +89,9 @@ class CalibrationPriors:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometrySettings:
-    """Random part of odometry (see OdometryNoise) and where keyframes stand."""
+    """Random part of odometry and where keyframes stand. The numbers are of `OdometryNoise`: per square root of a metre
+    unless named otherwise. Those with `imu`, `command` or `sampled` in the name go with that turn source, `heading_rad`
+    and `turn_fraction` with steering and with wheels read many times a second."""
 
     along_m: float = 0.03
     across_m: float = 0.025
