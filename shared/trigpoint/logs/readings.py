@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import cast
 
 from trigpoint.errors import InputError
-from trigpoint.events.corrected import AnchorLabelled, anchors_in_force
+from trigpoint.events.corrected import AnchorLabelled, Corrected, anchors_in_force
 from trigpoint.events.drives import Drive, drives_of
 from trigpoint.events.envelope import Envelope
 from trigpoint.events.estimated import FixJudged
@@ -66,9 +66,8 @@ def logged_drives(log: EventLog, *, progress: Progress = in_silence) -> tuple[Dr
 
 
 def logged_anchors(log: EventLog) -> tuple[AnchorLabelled, ...]:
-    """The anchors in force: of several labels of one name in one image the last."""
-    rows = log.read(LABEL_STREAM, kinds=(AnchorLabelled,))
-    return anchors_in_force(cast(AnchorLabelled, row.envelope.event) for row in rows)
+    """The anchors in force: of several labels of one name in one image the last, unless it was retracted since."""
+    return anchors_in_force(cast(Corrected, row.envelope.event) for row in log.read(LABEL_STREAM))
 
 
 def logged_verdicts(log: EventLog) -> tuple[FixJudged, ...]:
