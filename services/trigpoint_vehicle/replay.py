@@ -18,8 +18,6 @@ from trigpoint.events.observed import Observed
 from trigpoint.events.uplink import acknowledgement_key, uplink_key
 from trigpoint.logs.vehicle_log import RawMessage, read_vehicle_log
 
-LISTENER_POLL_S = 0.002  # how often to look whether ingest is there yet
-
 logger = logging.getLogger(__name__)
 
 
@@ -160,7 +158,7 @@ def _replay(
     vehicle = first.identity.source
     acknowledgements = bus.subscribe(acknowledgement_key(vehicle, root=settings.root))
     try:
-        _await_listener(bus, first.key, settings.listener_timeout_s)
+        _require_listener(bus, first.key, settings.listener_timeout_s)
         under_way = _UnderWay(bus, acknowledgements, settings)
         try:
             for message in chain((first,), messages):
@@ -192,9 +190,6 @@ def _encoded(rows: Iterable[Envelope[Observed]], root: str) -> Iterator[BusMessa
         yield event_message(envelope, key=uplink_key(envelope.identity.source, type(envelope.event), root=root))
 
 
-def _await_listener(bus: Bus, key: str, timeout_s: float) -> None:
-    deadline_s = time.monotonic() + timeout_s
-    while not bus.has_listener(key):
-        if time.monotonic() > deadline_s:
-            raise ServiceError(f"nobody listens to {key} after {timeout_s:g} s: is ingest running?")
-        time.sleep(LISTENER_POLL_S)
+def _require_listener(bus: Bus, key: str, timeout_s: float) -> None:
+    if not bus.await_listener(key, timeout_s):
+        raise ServiceError(f"nobody listens to {key} after {timeout_s:g} s: is ingest running?")

@@ -47,12 +47,14 @@ class MemoryExchange:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
+        self._joined = threading.Condition(self._lock)
         self._subscriptions: tuple[MemorySubscription, ...] = ()
 
     def join(self, subscription: MemorySubscription) -> None:
         """From now on the subscription hears what matches it."""
         with self._lock:
             self._subscriptions = (*self._subscriptions, subscription)
+            self._joined.notify_all()
 
     def leave(self, subscription: MemorySubscription) -> None:
         """The subscription hears no more; again: no effect."""
@@ -62,6 +64,11 @@ class MemoryExchange:
     def listeners(self, key: str) -> list[MemorySubscription]:
         """The subscriptions that match a key, in order of joining."""
         return [subscription for subscription in self._subscriptions if subscription.matches(key)]
+
+    def await_listener(self, key: str, timeout_s: float) -> bool:
+        """Whether a subscription that matches the key is there, or joins within `timeout_s`."""
+        with self._joined:
+            return self._joined.wait_for(lambda: bool(self.listeners(key)), timeout_s)
 
 
 class MemoryBus:
@@ -96,6 +103,11 @@ class MemoryBus:
         """Whether a subscription of the exchange matches the key."""
         self._require_open()
         return bool(self._exchange.listeners(checked_key(key)))
+
+    def await_listener(self, key: str, timeout_s: float) -> bool:
+        """Whether a subscription of the exchange matches the key, at once or within `timeout_s`."""
+        self._require_open()
+        return self._exchange.await_listener(checked_key(key), timeout_s)
 
     def close(self) -> None:
         """The session and its subscriptions ended."""

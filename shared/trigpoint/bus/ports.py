@@ -63,6 +63,9 @@ class Bus(Protocol):
     def has_listener(self, key: str) -> bool:
         """Whether a subscription that matches the key is known here now: what is published before is lost."""
 
+    def await_listener(self, key: str, timeout_s: float) -> bool:
+        """The same as soon as it is so, or False after `timeout_s`."""
+
     def close(self) -> None:
         """The session and its subscriptions ended; again: no effect."""
 

@@ -194,6 +194,17 @@ class ZenohBus:
         status = cast(zenoh.MatchingStatus, self._publisher(key, "").matching_status)
         return status.matching
 
+    def await_listener(self, key: str, timeout_s: float) -> bool:
+        """Whether Zenoh knows of a subscription that matches the key, at once or within `timeout_s`."""
+        heard = threading.Event()
+        changes = self._publisher(key, "").declare_matching_listener(
+            lambda status: heard.set() if status.matching else None
+        )
+        try:
+            return self.has_listener(key) or heard.wait(timeout_s)
+        finally:
+            changes.undeclare()  # type: ignore[no-untyped-call]
+
     def close(self) -> None:
         """The session, its publishers and subscriptions ended: an open one would hang the interpreter's exit."""
         for subscription in self._subscriptions:

@@ -1,6 +1,7 @@
 """What every bus does: the same claims hold in memory and on Zenoh (two sessions over loopback TCP)."""
 
 import socket
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -53,10 +54,7 @@ def message(key: str, sequence: int = 0) -> BusMessage:
 
 def until_heard(bus: Bus, key: str) -> None:
     """Discovery of a subscription takes a moment; what is published before it is lost by design."""
-    deadline = time.monotonic() + SOON_S
-    while not bus.has_listener(key):
-        assert time.monotonic() < deadline, f"nobody listens to {key}"
-        time.sleep(0.001)
+    assert bus.await_listener(key, SOON_S), f"nobody listens to {key}"
 
 
 def until_lost(subscription: Subscription, count: int) -> None:
@@ -160,6 +158,15 @@ def test_a_closed_subscription_hears_no_more(pair: tuple[Bus, Bus]) -> None:
 
 def test_nobody_listens_where_nobody_subscribed(pair: tuple[Bus, Bus]) -> None:
     assert not pair[0].has_listener("t/a")
+    assert not pair[0].await_listener("t/a", NEVER_S)
+
+
+def test_a_listener_that_comes_is_noticed(pair: tuple[Bus, Bus]) -> None:
+    publisher, listener = pair
+    coming = threading.Timer(NEVER_S, listener.subscribe, args=("t/*",))
+    coming.start()
+    assert publisher.await_listener("t/a", SOON_S)
+    coming.join()
 
 
 @pytest.mark.parametrize("key", ["", "/t", "t/", "t//a", "t/*", "t/**/a", "t/a?b", "t/#", "t/$a", "t/@a"])

@@ -63,6 +63,9 @@ class LossyBus:
     def has_listener(self, key: str) -> bool:
         return self._bus.has_listener(key)
 
+    def await_listener(self, key: str, timeout_s: float) -> bool:
+        return self._bus.await_listener(key, timeout_s)
+
     def close(self) -> None:
         self._bus.close()
 
