@@ -29,6 +29,7 @@ from trigpoint_vehicle.core.source_frames import (
 )
 from trigpoint_vehicle.core.source_times import GPS_EPOCH, UNIX_EPOCH, TimeScale, TimeUnit
 
+EPOCH_YEARS = (1900, 2100)  # the first and the last: what is counted from them fits 64-bit nanoseconds
 VEHICLE_NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"  # a file's name and part of a key on the bus
 
 
@@ -37,6 +38,12 @@ class Clock(ManifestPart):
 
     epoch: AwareDatetime | None = None
     scale: TimeScale = "utc"
+
+    @model_validator(mode="after")
+    def _is_near(self) -> Self:
+        if not EPOCH_YEARS[0] <= self.second_zero().year <= EPOCH_YEARS[1]:
+            raise ValueError(f"epoch {self.second_zero()} is outside the years {EPOCH_YEARS[0]} to {EPOCH_YEARS[1]}")
+        return self
 
     def second_zero(self) -> datetime:
         """The instant the clock's 0 is named by."""

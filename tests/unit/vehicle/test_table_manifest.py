@@ -71,6 +71,12 @@ def test_an_epoch_without_its_zone_is_refused() -> None:
         manifest(rest="clock = { epoch = 2024-03-04T00:00:00 }")
 
 
+@pytest.mark.parametrize("year", ["0001", "9999"])
+def test_an_epoch_whose_stamps_fit_no_log_is_refused(year: str) -> None:
+    with pytest.raises(InputError, match=f"clock: .*epoch {year}-.* is outside the years 1900 to 2100"):
+        manifest(rest=f"clock = {{ epoch = {year}-03-04T00:00:00Z }}")
+
+
 @pytest.mark.parametrize("name", ["", "../car", "a/b", "*", "a b"])
 def test_a_name_that_is_no_file_and_no_key_is_refused(name: str) -> None:
     with pytest.raises(InputError, match=r"vehicle.0.name"):
