@@ -1,6 +1,7 @@
 """Where an event goes: its key on the bus and its stream in the log."""
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from trigpoint.errors import InputError
 from trigpoint.events.corrected import AnchorLabelled, AnchorRetracted, DriveExcluded, DriveIncluded
@@ -25,8 +26,10 @@ from trigpoint.events.observed import (
     WheelSpeedMeasured,
 )
 from trigpoint.geodesy.positions import MapPosition
-from trigpoint.geodesy.projection import MapFrame, wgs84_from_map
 from trigpoint.geodesy.web_tiles import tile_at
+
+if TYPE_CHECKING:
+    from trigpoint.geodesy.projection import MapFrame
 
 DEFAULT_ROOT = "trigpoint"
 DEFAULT_MAP = "main"
@@ -114,7 +117,7 @@ def key_of(
     *,
     root: str = DEFAULT_ROOT,
     map_name: str = DEFAULT_MAP,
-    frame: MapFrame | None = None,
+    frame: "MapFrame | None" = None,
 ) -> str:
     """The key an event is published under; a landmark's names its tile, for which `frame` is needed.
 
@@ -132,7 +135,9 @@ def key_expression(event_class: type, *, root: str = DEFAULT_ROOT) -> str:
     return f"{valid_name(root)}/{KEY_VERSION}/{KEY_PATTERNS[event_class].format(**wild)}"
 
 
-def _tile_chunks(landmark: LandmarkSolved, frame: MapFrame | None) -> dict[str, int]:
+def _tile_chunks(landmark: LandmarkSolved, frame: "MapFrame | None") -> dict[str, int]:
+    from trigpoint.geodesy.projection import wgs84_from_map  # here: vehicles name no tiles and do without pyproj
+
     if frame is None:
         raise InputError(f"landmark {landmark.landmark!r}: its key names a tile, and no map frame was given")
     position = MapPosition(float(landmark.position_m[0]), float(landmark.position_m[1]))
