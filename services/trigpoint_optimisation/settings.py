@@ -97,6 +97,7 @@ class OdometrySettings:
     across_m: float = 0.025
     across_imu_m: float = 0.01
     heading_rad: float = 0.0015
+    heading_unmeasured_rad: float = 0.005  # where nothing measures turns: the turn bias alone follows them
     heading_imu_rad: float = 0.0001
     heading_rad_per_sqrt_s: float = 0.0003
     turn_fraction: float = 0.035

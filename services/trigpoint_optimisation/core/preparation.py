@@ -83,10 +83,12 @@ def odometry_noise(source: TurnSource, settings: OdometrySettings) -> OdometryNo
         return _command_noise(settings)
     if source is TurnSource.SAMPLED_WHEELS:
         return _sampled_noise(settings)
+    unmeasured = source is TurnSource.NONE
+    heading_rad = settings.heading_unmeasured_rad if unmeasured else settings.heading_rad
     return OdometryNoise(
         along_m=settings.along_m,
         across_m=settings.across_imu_m if by_imu else settings.across_m,
-        heading_rad=settings.heading_imu_rad if by_imu else settings.heading_rad,
+        heading_rad=settings.heading_imu_rad if by_imu else heading_rad,
         heading_rad_per_sqrt_s=settings.heading_rad_per_sqrt_s,
         turn_fraction=settings.turn_fraction_imu if by_imu else settings.turn_fraction,
         floor_m=settings.floor_m,
