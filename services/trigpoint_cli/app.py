@@ -18,6 +18,8 @@ FULL_DISK = (errno.ENOSPC, errno.EDQUOT)
 
 COMMANDS = {
     "demo": ("trigpoint_cli.demo", "Simulate a campus and take it all the way to a map, a report and its errors."),
+    "config": ("trigpoint_cli.config", "Show or check the configuration of a deployment."),
+    "serve": ("trigpoint_cli.serve", "Run one service as a process of its own."),
     "convert": ("trigpoint_cli.convert", "Turn recorded data into vehicles' logs."),
     "ingest": ("trigpoint_cli.ingest", "Take vehicles' logs into a data directory."),
     "anchors": ("trigpoint_cli.anchors", "Take anchors labelled in aerial images into a data directory."),

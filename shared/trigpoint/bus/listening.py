@@ -15,6 +15,11 @@ class ListeningService(ABC):
         self._subscription = subscription
         self._idle_s = idle_s
 
+    @property
+    def ready(self) -> bool:
+        """Whether it has caught up; whoever only listens has nothing to catch up with."""
+        return True
+
     @abstractmethod
     def step(self, timeout_s: float) -> bool:
         """One message taken, or none within the timeout (then False); what is due is appended."""

@@ -1,0 +1,84 @@
+"""One service at work in a thread of its own, and what is known of it from outside."""
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
+from enum import StrEnum
+from typing import Any
+
+from trigpoint.observability.endpoint import Status
+from trigpoint.observability.metrics import Instruments
+from trigpoint.observability.running import Service
+
+Opened = Callable[[], AbstractContextManager[Service]]
+
+
+class Stage(StrEnum):
+    """Where in its life a service is."""
+
+    STARTING = "starting"
+    RUNNING = "running"
+    STOPPING = "stopping"
+    ENDED = "ended"
+    FAILED = "failed"
+
+
+class ServedService(threading.Thread):
+    """A service opened, run and closed in one thread; `error` is what ended it, if it was not told to end."""
+
+    def __init__(self, opened: Opened, instruments: Instruments) -> None:
+        super().__init__(name=instruments.service, daemon=True)
+        self._opened, self._instruments = opened, instruments
+        self._stop_requested = threading.Event()
+        self._service: Service | None = None
+        self._finished = threading.Event()
+        self._began_s = time.monotonic()
+        self.error: Exception | None = None
+
+    def run(self) -> None:
+        """The service's life; ends when it was told to, or cannot go on."""
+        try:
+            with self._opened() as service:
+                self._service = service
+                service.run(self._stop_requested)
+                service.close()
+        except Exception as error:  # raised again by whoever waits for this thread
+            self.error = error
+        finally:
+            self._finished.set()
+
+    @property
+    def stage(self) -> Stage:
+        """Where in its life the service is."""
+        if self._finished.is_set():
+            return Stage.ENDED if self.error is None else Stage.FAILED
+        if self._stop_requested.is_set():
+            return Stage.STOPPING
+        return Stage.STARTING if self._service is None else Stage.RUNNING
+
+    def stop(self, limit_s: float) -> bool:
+        """Whether it finished what it began, within the limit."""
+        self._stop_requested.set()
+        self.join(limit_s)
+        return not self.is_alive()
+
+    def alive(self) -> Status:
+        """Alive unless it failed."""
+        return self.stage is not Stage.FAILED, self._details()
+
+    def ready(self) -> Status:
+        """Ready when the service says so."""
+        service = self._service
+        caught_up = service is not None and self.stage is Stage.RUNNING and service.ready
+        return caught_up, self._details()
+
+    def exposition(self) -> bytes:
+        """The service's numbers."""
+        return self._instruments.exposition()
+
+    def _details(self) -> Mapping[str, Any]:
+        details = {"service": self._instruments.service, "stage": self.stage.value}
+        if self.error is not None:
+            details["error"] = str(self.error)
+        return {**details, "up_s": round(time.monotonic() - self._began_s, 1)}

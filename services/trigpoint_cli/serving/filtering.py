@@ -1,0 +1,17 @@
+"""Filtering as a process of its own."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from trigpoint.observability.metrics import Instruments
+from trigpoint.observability.running import Service
+from trigpoint_cli.serving.resources import opened_resources
+from trigpoint_cli.settings import Settings
+from trigpoint_filtering.live import LiveFiltering
+
+
+@contextmanager
+def opened(settings: Settings, instruments: Instruments) -> Iterator[Service]:
+    """Filtering on the fleet's log and bus."""
+    with opened_resources(settings) as resources:
+        yield LiveFiltering(resources.log, resources.bus, settings.filtering, root=settings.fleet.root)

@@ -1,0 +1,30 @@
+"""What the services of a fleet share: the log and the bus, opened as the configuration says."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from trigpoint.bus.zenoh_bus import ZenohBus
+from trigpoint.logs.mcap_log import McapLog
+from trigpoint_cli.data_dir import DataDirectory
+from trigpoint_cli.settings import Settings
+
+
+@dataclass(frozen=True, slots=True)
+class Resources:
+    """The fleet's log and this process's session on the bus."""
+
+    log: McapLog
+    bus: ZenohBus
+
+
+def data_of(settings: Settings) -> DataDirectory:
+    """The data directory of the fleet."""
+    return DataDirectory(settings.fleet.data)
+
+
+@contextmanager
+def opened_resources(settings: Settings) -> Iterator[Resources]:
+    """The log and the bus; closed in reverse, the log last. Raises InputError, ServiceError."""
+    with data_of(settings).new_log() as log, ZenohBus(settings.bus) as bus:
+        yield Resources(log, bus)

@@ -1,0 +1,68 @@
+"""What a deployment is told: every section of its configuration, from flags, the environment and a file."""
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+import click
+
+from trigpoint.bus.zenoh_bus import ZenohSettings
+from trigpoint.configuration.building import Configured, configured
+from trigpoint.configuration.given import from_environment, from_flags, from_toml
+from trigpoint.configuration.limits import SetElsewhere
+from trigpoint.configuration.sections import (
+    DatabaseSettings,
+    FleetSettings,
+    HttpSettings,
+    LoggingSettings,
+    ServeSettings,
+    TracingSettings,
+    UpSettings,
+)
+from trigpoint_filtering.settings import FilterSettings
+from trigpoint_ingest.settings import IngestSettings
+from trigpoint_optimisation.settings import SolveSettings
+
+NAMES_OF_FLEET = SetElsewhere((("root", "fleet.root"), ("map_name", "fleet.map")))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """One section a field; `trigpoint config show` prints them."""
+
+    fleet: FleetSettings
+    bus: ZenohSettings = field(default_factory=ZenohSettings)
+    database: DatabaseSettings = field(default_factory=DatabaseSettings)
+    ingest: Annotated[IngestSettings, NAMES_OF_FLEET] = field(default_factory=IngestSettings)
+    filtering: FilterSettings = field(default_factory=FilterSettings)
+    optimisation: SolveSettings = field(default_factory=SolveSettings)
+    router: ZenohSettings = field(default_factory=lambda: ZenohSettings(mode="router", listen=("tcp/127.0.0.1:7447",)))
+    up: UpSettings = field(default_factory=UpSettings)
+    serve: ServeSettings = field(default_factory=ServeSettings)
+    http: HttpSettings = field(default_factory=HttpSettings)
+    logging: LoggingSettings = field(default_factory=LoggingSettings)
+    tracing: TracingSettings = field(default_factory=TracingSettings)
+
+
+def configured_settings(file: Path | None, flags: Sequence[str]) -> Configured[Settings]:
+    """The settings from flags, over the environment, over a file. Raises ConfigurationRefused, InputError."""
+    layers = [from_environment(os.environ), from_flags(flags)]
+    return configured(Settings, layers if file is None else [from_toml(file), *layers])
+
+
+def configuration_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A command that gets `config` (a path or None) and `flags`."""
+    chosen = click.option(
+        "--set",
+        "flags",
+        multiple=True,
+        metavar="SECTION.KEY=VALUE",
+        help="A value over that of the environment and the file; may be given more than once.",
+    )(function)
+    option: Callable[..., Any] = click.option(
+        "--config", metavar="FILE", type=click.Path(path_type=Path), help="The configuration, in TOML."
+    )
+    result: Callable[..., Any] = option(chosen)
+    return result
