@@ -7,17 +7,22 @@ are the time of measurement: nothing in a file depends on when it was written. A
 is the file's first number plus the messages before it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import groupby
 
+import numpy as np
 from google.protobuf.descriptor import FileDescriptor
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from mcap.records import Channel
+from numpy.typing import NDArray
 
 from trigpoint.errors import InputError
-from trigpoint.events.codec import Event, encode, message_class
+from trigpoint.events.codec import Event, encode, event_class, message_class
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.keys import DEFAULT_MAP, KEY_PATTERNS, valid_name, vehicle_of
+from trigpoint.events.runs import EncodedRun
 
 SEQUENCE_SPAN = 2**32  # MCAP's Message.sequence is a uint32
 STAMP_LIMIT_NS = 2**63  # the catalog's integers are signed
@@ -41,16 +46,87 @@ class ChannelKey:
 
 
 @dataclass(frozen=True, slots=True)
-class PackedRow:
-    """An event ready to be written."""
+class PackedRows:
+    """Events ready to be written, at least one: of each row the number of its channel (n,), the MCAP sequence (n,),
+    the stamp in ns (n,) and the payload.
+    """
 
-    channel: ChannelKey
-    mcap_sequence: int
-    stamp_ns: int
-    payload: bytes
+    channels: tuple[ChannelKey, ...]
+    channel_of_row: NDArray[np.int64]
+    mcap_sequences: NDArray[np.int64]
+    stamps_ns: NDArray[np.int64]
+    payloads: Sequence[bytes]
+
+    def part(self, start: int, stop: int) -> "PackedRows":
+        """The rows [start, stop)."""
+        return PackedRows(
+            self.channels,
+            self.channel_of_row[start:stop],
+            self.mcap_sequences[start:stop],
+            self.stamps_ns[start:stop],
+            self.payloads[start:stop],
+        )
 
 
-def packed(envelope: Envelope[Event]) -> PackedRow:
+_Row = tuple[ChannelKey, int, int, bytes]  # channel, MCAP sequence, stamp in ns, payload
+
+
+def packed_rows(rows: Sequence[Envelope[Event] | EncodedRun]) -> PackedRows:
+    """The events as they are written, at least one. Raises InputError for a stamp or sequence no log can hold."""
+    number_of: dict[ChannelKey, int] = {}
+    parts: list[PackedRows] = []
+    for encoded, group in groupby(rows, key=lambda row: isinstance(row, EncodedRun)):
+        if encoded:
+            parts += [_run_rows(run, number_of) for run in group if isinstance(run, EncodedRun)]
+        else:
+            parts.append(_table([_row(row) for row in group if isinstance(row, Envelope)], number_of))
+    return PackedRows(
+        tuple(number_of),
+        np.concatenate([part.channel_of_row for part in parts]),
+        np.concatenate([part.mcap_sequences for part in parts]),
+        np.concatenate([part.stamps_ns for part in parts]),
+        [payload for part in parts for payload in part.payloads],
+    )
+
+
+def _table(rows: Sequence[_Row], number_of: dict[ChannelKey, int]) -> PackedRows:
+    return PackedRows(
+        (),
+        np.array([number_of.setdefault(row[0], len(number_of)) for row in rows], dtype=np.int64),
+        np.array([row[1] for row in rows], dtype=np.int64),
+        np.array([row[2] for row in rows], dtype=np.int64),
+        [row[3] for row in rows],
+    )
+
+
+def _run_rows(run: EncodedRun, number_of: dict[ChannelKey, int]) -> PackedRows:
+    if len(run) and (int(run.stamps_ns.min()) < 0 or int(run.sequences.min()) < 0):
+        raise InputError(f"{run.source!r}, boot {run.boot_id!r}: a stamp or sequence below 0")
+    mcap_sequences = run.sequences % SEQUENCE_SPAN
+    bases = run.sequences - mcap_sequences
+    channel_of_row = np.zeros(len(run), dtype=np.int64)
+    for schema, base in dict.fromkeys(zip(run.schema_of_row.tolist(), bases.tolist(), strict=True)):
+        channel = _drive_channel(run.schemas[schema], run.source, run.boot_id, base)
+        number = number_of.setdefault(channel, len(number_of))
+        channel_of_row[(run.schema_of_row == schema) & (bases == base)] = number
+    return PackedRows((), channel_of_row, mcap_sequences, run.stamps_ns, run.payloads)
+
+
+def _drive_channel(schema_name: str, source: str, boot_id: str, sequence_base: int) -> ChannelKey:
+    found = event_class(schema_name)
+    if found is None:
+        raise InputError(f"{source!r}, boot {boot_id!r}: no event has schema {schema_name!r}")
+    return _channel(
+        found,
+        schema_name,
+        source,
+        boot_id,
+        source,
+        sequence_base,
+    )
+
+
+def _row(envelope: Envelope[Event]) -> _Row:
     """The event as it is written. Raises InputError for a stamp or sequence no log can hold."""
     identity, stamp_ns = envelope.identity, envelope.stamp_ns
     if not 0 <= stamp_ns < STAMP_LIMIT_NS:
@@ -68,7 +144,7 @@ def packed(envelope: Envelope[Event]) -> PackedRow:
         vehicle_of(envelope),
         base,
     )
-    return PackedRow(channel, mcap_sequence, stamp_ns, payload)
+    return channel, mcap_sequence, stamp_ns, payload
 
 
 @lru_cache(maxsize=4096)  # one for each topic and boot of a run: hardly ever made twice

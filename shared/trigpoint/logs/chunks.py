@@ -2,27 +2,32 @@
 
 import struct
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from itertools import chain
 from typing import NamedTuple, Protocol, TypeVar
 
+import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, McapRecord, Schema
 from mcap.stream_reader import get_chunk_data_stream
+from numpy.typing import NDArray
 
 from trigpoint.errors import LogDamaged
-from trigpoint.logs.channels import PackedRow
+from trigpoint.logs.channels import PackedRows
 
 RecordT = TypeVar("RecordT", covariant=True)
-MessageIndexes = Mapping[int, list[tuple[int, int]]]  # by channel
+MessageIndexes = Mapping[int, NDArray[np.uint64]]  # by channel: (n, 2) time in ns and offset of each message
 FRAME = struct.Struct("<BQ")  # opcode and length of any record
 MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 MESSAGE_FIXED_BYTES = MESSAGE.size - FRAME.size
+_HEADS = np.dtype(  # many of MESSAGE, in the same bytes
+    [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log", "<u8"), ("publish", "<u8")]
+)
 COMPRESSION = "zstd"
 CHUNK_LIMIT_BYTES = 1 << 30  # what a damaged header may make us allocate; writers use some megabytes
 COMPRESSION_LEVEL = 3  # zstd's own default: the ratio hardly grows above it on packed doubles
@@ -43,7 +48,7 @@ class ChunkMessage(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PackedChunk:
-    """A chunk record, and for each of its channels (time, offset in the records) of each message."""
+    """A chunk record and its message indexes."""
 
     record: Chunk
     index_by_channel: MessageIndexes
@@ -82,39 +87,48 @@ def built(builder: RecordBuilder) -> bytes:
     return data
 
 
-def pack(rows: Sequence[PackedRow], channel_ids: Sequence[int], definitions: bytes) -> PackedChunk:
+def pack(rows: PackedRows, channel_ids: NDArray[np.int64], definitions: bytes) -> PackedChunk:
     """A chunk of at least one row, each in the channel beside it; `definitions` are the records before them."""
-    parts, offset = [definitions], len(definitions)
-    entries: dict[int, list[tuple[int, int]]] = {}
-    for row, channel_id in zip(rows, channel_ids, strict=True):
-        length = MESSAGE_FIXED_BYTES + len(row.payload)
-        stamp_ns = row.stamp_ns
-        parts.append(MESSAGE.pack(Opcode.MESSAGE, length, channel_id, row.mcap_sequence, stamp_ns, stamp_ns))
-        parts.append(row.payload)
-        entries.setdefault(channel_id, []).append((stamp_ns, offset))
-        offset += FRAME.size + length
-    data = b"".join(parts)
-    return PackedChunk(_chunk(data, [row.stamp_ns for row in rows]), _indexes(entries))
+    sizes = np.fromiter(map(len, rows.payloads), dtype=np.int64, count=len(rows.payloads)) + MESSAGE.size
+    offsets = len(definitions) + np.cumsum(sizes) - sizes
+    heads = np.empty(len(sizes), dtype=_HEADS)
+    heads["opcode"], heads["length"] = int(Opcode.MESSAGE), sizes - FRAME.size
+    heads["channel"], heads["sequence"] = channel_ids, rows.mcap_sequences
+    heads["log"] = heads["publish"] = rows.stamps_ns
+    packed = heads.tobytes()
+    starts = range(0, len(packed), MESSAGE.size)
+    parts = chain.from_iterable(zip((packed[s : s + MESSAGE.size] for s in starts), rows.payloads, strict=True))
+    data = b"".join((definitions, *parts))
+    return PackedChunk(_chunk(data, rows.stamps_ns), _indexes(channel_ids, rows.stamps_ns, offsets))
 
 
-def _indexes(entries: MessageIndexes) -> MessageIndexes:
+def _indexes(
+    channel_ids: NDArray[np.int64], stamps_ns: NDArray[np.int64], offsets: NDArray[np.int64]
+) -> MessageIndexes:
     """By channel, a channel's entries sorted by time, as readers want them."""
-    return {channel_id: sorted(entries[channel_id]) for channel_id in sorted(entries)}
+    order = np.lexsort((offsets, stamps_ns, channel_ids))
+    entries = np.stack([stamps_ns, offsets], axis=1).astype("<u8")[order]
+    used, firsts = np.unique(channel_ids[order], return_index=True)
+    stops = [*firsts[1:].tolist(), len(order)]
+    return {
+        channel_id: entries[first:stop]
+        for channel_id, first, stop in zip(used.tolist(), firsts.tolist(), stops, strict=True)
+    }
 
 
-def message_index_bytes(channel_id: int, entries: Sequence[tuple[int, int]]) -> bytes:
+def message_index_bytes(channel_id: int, entries: NDArray[np.uint64]) -> bytes:
     """The message index record of one channel in a chunk, from (time, offset) of each message."""
     size = 16 * len(entries)
     head = FRAME.pack(Opcode.MESSAGE_INDEX, 2 + 4 + size) + struct.pack("<HI", channel_id, size)
-    return head + struct.pack(f"<{2 * len(entries)}Q", *chain.from_iterable(entries))
+    return head + entries.astype("<u8").tobytes()
 
 
-def _chunk(data: bytes, stamps_ns: Sequence[int]) -> Chunk:
+def _chunk(data: bytes, stamps_ns: NDArray[np.int64]) -> Chunk:
     return Chunk(
         compression=COMPRESSION,
         data=zstandard.compress(data, COMPRESSION_LEVEL),
-        message_start_time=min(stamps_ns),
-        message_end_time=max(stamps_ns),
+        message_start_time=int(stamps_ns.min()),
+        message_end_time=int(stamps_ns.max()),
         uncompressed_crc=zlib.crc32(data),
         uncompressed_size=len(data),
     )
@@ -182,7 +196,6 @@ def definitions(data: bytes) -> tuple[tuple[Schema, ...], tuple[Channel, ...]]:
 
 def message_indexes(data: bytes) -> MessageIndexes:
     """The message index of each channel in a chunk, made anew from its records."""
-    entries: dict[int, list[tuple[int, int]]] = {}
-    for message in messages(data):
-        entries.setdefault(message.channel_id, []).append((message.log_time_ns, message.offset))
-    return _indexes(entries)
+    found = [(message.channel_id, message.log_time_ns, message.offset) for message in messages(data)]
+    columns = np.array(found, dtype=np.int64).reshape(-1, 3)
+    return _indexes(columns[:, 0], columns[:, 1], columns[:, 2])

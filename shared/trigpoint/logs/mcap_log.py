@@ -15,8 +15,9 @@ from trigpoint.events.codec import Event, decode, event_class
 from trigpoint.events.envelope import Envelope, LogPosition
 from trigpoint.events.keys import DEFAULT_MAP, STREAM_PATTERNS
 from trigpoint.events.observed import MapFramePinned, VehicleDescribed
+from trigpoint.events.runs import EncodedRun
 from trigpoint.logs.catalog import NAME, Catalog, CatalogChunk, FileContents
-from trigpoint.logs.channels import ChannelKey, PackedRow, packed
+from trigpoint.logs.channels import ChannelKey, PackedRows, packed_rows
 from trigpoint.logs.chunks import FRAME, messages, parsed, unpacked
 from trigpoint.logs.log_files import bring_up_to_date, file_path, valid_stream
 from trigpoint.logs.ports import LoggedEvent
@@ -74,6 +75,7 @@ class McapLog:
         self._map = {"name": map_name}
         self._catalog = Catalog(directory / NAME)
         self._writers: dict[str, StreamWriter] = {}
+        self._append_locks: dict[str, threading.Lock] = {}
         self._lock = threading.RLock()
         try:
             self._bring_all_up_to_date()
@@ -86,23 +88,25 @@ class McapLog:
         origin = {"origin_easting_m": repr(frame.origin_easting_m), "origin_northing_m": repr(frame.origin_northing_m)}
         self._map = {"name": self._map["name"], "crs": frame.crs, **origin}
 
-    def append(self, stream: str, rows: Sequence[Envelope[Event]]) -> LogPosition:
+    def append(self, stream: str, rows: Sequence[Envelope[Event] | EncodedRun]) -> LogPosition:
         """The position of the last row (of the last event there, without rows), once all rows are durable.
 
         Raises AppendFailed if they cannot be made so or another process writes the stream, InputError for a name,
         stamp or sequence no log can hold, EventRejected for a value its schema cannot hold.
         """
         valid_stream(stream)
-        ready = [packed(row) for row in rows]
         with self._lock:
+            own = self._append_locks.setdefault(stream, threading.Lock())
+        with own:  # one stream waits for its disk while others pack
+            ready = packed_rows(rows) if rows else None
             writer = self._writer(stream)
             if ready:
                 self._append(writer, stream, ready)
             return LogPosition(stream, writer.next_number - 1)
 
-    def _append(self, writer: StreamWriter, stream: str, rows: Sequence[PackedRow]) -> None:
+    def _append(self, writer: StreamWriter, stream: str, rows: PackedRows) -> None:
         try:
-            writer.append(rows, self._metadata(stream, rows[0].channel.vehicle))
+            writer.append(rows, self._metadata(stream, rows.channels[0].vehicle))
         except BaseException:
             del self._writers[stream]
             raise

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
+import numpy as np
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
@@ -23,7 +24,7 @@ from mcap.records import (
 )
 from mcap.writer import MCAP0_MAGIC
 
-from trigpoint.logs.channels import ENCODING, ChannelKey, PackedRow, channel_record, schema_data
+from trigpoint.logs.channels import ENCODING, ChannelKey, PackedRows, channel_record, schema_data
 from trigpoint.logs.chunks import PackedChunk, built, message_index_bytes, pack, record_bytes
 
 LIBRARY = "trigpoint"  # without a version: it would change the bytes of the same log
@@ -148,7 +149,7 @@ class McapFileWriter:
         """The channels in use and their ids."""
         return self._channel_ids
 
-    def append(self, rows: Sequence[PackedRow]) -> tuple[WrittenChunk, ...]:
+    def append(self, rows: PackedRows) -> tuple[WrittenChunk, ...]:
         """The chunks the rows were written in, in order. Raises OSError as the output does."""
         head, self._head = self._head, b""
         self._write(head)
@@ -168,10 +169,13 @@ class McapFileWriter:
             head += data
         return head
 
-    def _append_chunk(self, rows: Sequence[PackedRow]) -> WrittenChunk:
+    def _append_chunk(self, rows: PackedRows) -> WrittenChunk:
         builder = RecordBuilder()
-        channel_ids = [self._channel_ids.get(row.channel) or self._add_channel(row.channel, builder) for row in rows]
-        packed, offset = pack(rows, channel_ids, built(builder)), self._position
+        id_of_channel = np.zeros(len(rows.channels), dtype=np.int64)
+        for number in dict.fromkeys(rows.channel_of_row.tolist()):
+            key = rows.channels[number]
+            id_of_channel[number] = self._channel_ids.get(key) or self._add_channel(key, builder)
+        packed, offset = pack(rows, id_of_channel[rows.channel_of_row], built(builder)), self._position
         self._write(self._index.add_chunk(packed, offset))
         return WrittenChunk(
             offset=offset,
@@ -207,13 +211,13 @@ class McapFileWriter:
         self._position += len(data)
 
 
-def _groups_of_rows(rows: Sequence[PackedRow]) -> Iterator[Sequence[PackedRow]]:
+def _groups_of_rows(rows: PackedRows) -> Iterator[PackedRows]:
     """The rows cut into runs of about CHUNK_BYTES of payload."""
     start, size = 0, 0
-    for index, row in enumerate(rows):
-        size += len(row.payload)
+    for index, payload in enumerate(rows.payloads):
+        size += len(payload)
         if size >= CHUNK_BYTES:
-            yield rows[start : index + 1]
+            yield rows.part(start, index + 1)
             start, size = index + 1, 0
-    if start < len(rows):
-        yield rows[start:]
+    if start < len(rows.payloads):
+        yield rows.part(start, len(rows.payloads))

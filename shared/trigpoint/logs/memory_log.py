@@ -5,7 +5,8 @@ from collections.abc import Iterator, Sequence
 
 from trigpoint.events.codec import Event
 from trigpoint.events.envelope import Envelope, LogPosition
-from trigpoint.logs.channels import packed
+from trigpoint.events.runs import EncodedRun, envelopes
+from trigpoint.logs.channels import packed_rows
 from trigpoint.logs.log_files import valid_stream
 from trigpoint.logs.ports import LoggedEvent
 
@@ -17,14 +18,15 @@ class MemoryLog:
         self._streams: dict[str, list[Envelope[Event]]] = {}
         self._lock = threading.Lock()
 
-    def append(self, stream: str, rows: Sequence[Envelope[Event]]) -> LogPosition:
+    def append(self, stream: str, rows: Sequence[Envelope[Event] | EncodedRun]) -> LogPosition:
         """The position of the last row. Raises InputError for a name, stamp or sequence no file could hold."""
         valid_stream(stream)
-        for row in rows:
-            packed(row)
+        if rows:
+            packed_rows(rows)
+        events = [event for row in rows for event in (envelopes(row) if isinstance(row, EncodedRun) else (row,))]
         with self._lock:
             kept = self._streams.setdefault(stream, [])
-            kept.extend(rows)
+            kept.extend(events)
             return LogPosition(stream, len(kept) - 1)
 
     def read(

@@ -6,6 +6,7 @@ from typing import Protocol
 
 from trigpoint.events.codec import Event
 from trigpoint.events.envelope import Envelope, LogPosition
+from trigpoint.events.runs import EncodedRun
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,8 +20,9 @@ class LoggedEvent:
 class EventLog(Protocol):
     """Append-only streams of events; one writer a stream."""
 
-    def append(self, stream: str, rows: Sequence[Envelope[Event]]) -> LogPosition:
-        """The position of the last row, once all rows are durable. Raises AppendFailed."""
+    def append(self, stream: str, rows: Sequence[Envelope[Event] | EncodedRun]) -> LogPosition:
+        """The position of the last row, once all rows are durable; a run is as many rows as it holds, kept as the
+        bytes it has. Raises AppendFailed."""
 
     def read(
         self,

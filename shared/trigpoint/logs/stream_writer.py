@@ -11,7 +11,7 @@ from pathlib import Path
 
 from trigpoint.errors import AppendFailed
 from trigpoint.logs.catalog import Catalog, CatalogChunk, CatalogEntry, CatalogFile
-from trigpoint.logs.channels import PackedRow
+from trigpoint.logs.channels import PackedRows
 from trigpoint.logs.log_files import bring_up_to_date, file_path, mend
 from trigpoint.logs.mcap_writer import CHANNEL_LIMIT, McapFileWriter, WrittenChunk
 
@@ -65,12 +65,12 @@ class StreamWriter:
             self._lock.close()
             raise
 
-    def append(self, rows: Sequence[PackedRow], metadata: Mapping[str, Mapping[str, str]]) -> None:
+    def append(self, rows: PackedRows, metadata: Mapping[str, Mapping[str, str]]) -> None:
         """The rows durable. Raises AppendFailed and lets the stream go; nothing of them counts as appended then,
         unless it was only the end of a full file that could not be written."""
         number = self.next_number
         try:
-            target = self._open_file or self._begin(rows[0], metadata)
+            target = self._open_file or self._begin(int(rows.stamps_ns[0]), metadata)
             chunks = target.writer.append(rows)
             os.fsync(target.file.fileno())
             self._enter(target, chunks)
@@ -94,10 +94,10 @@ class StreamWriter:
             raise AppendFailed(f"stream {self._folder.name}: last file not ended: {error}") from error
         self._lock.close()
 
-    def _begin(self, row: PackedRow, metadata: Mapping[str, Mapping[str, str]]) -> _OpenFile:
+    def _begin(self, stamp_ns: int, metadata: Mapping[str, Mapping[str, str]]) -> _OpenFile:
         file = file_path(self._folder, self.next_number).open("xb", buffering=0)
         writer = McapFileWriter(file, metadata=metadata)
-        self._open_file = _OpenFile(self.next_number, file, writer, row.stamp_ns, row.stamp_ns)
+        self._open_file = _OpenFile(self.next_number, file, writer, stamp_ns, stamp_ns)
         _sync_folder(self._folder)
         _sync_folder(self._folder.parent)
         return self._open_file

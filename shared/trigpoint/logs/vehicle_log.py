@@ -10,7 +10,7 @@ from pathlib import Path
 from trigpoint.errors import AppendFailed, LogDamaged
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.observed import Observed
-from trigpoint.logs.channels import packed
+from trigpoint.logs.channels import packed_rows
 from trigpoint.logs.chunks import messages
 from trigpoint.logs.mcap_scan import Damage, McapScan
 from trigpoint.logs.mcap_writer import McapFileWriter
@@ -53,7 +53,7 @@ def write_vehicle_log(path: Path, rows: Iterable[Envelope[Observed]], *, vehicle
 
 
 def _append(writer: McapFileWriter, batch: Sequence[Envelope[Observed]]) -> int:
-    writer.append([packed(row) for row in batch])
+    writer.append(packed_rows(batch))
     return len(batch)
 
 
