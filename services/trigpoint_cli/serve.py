@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
@@ -14,16 +15,12 @@ from trigpoint.observability.endpoint import Endpoint, EndpointSettings, Health
 from trigpoint.observability.log_lines import log_to
 from trigpoint.observability.metrics import Instruments
 from trigpoint.observability.running import Service
+from trigpoint_cli.output import Answer, Screen, answering
 from trigpoint_cli.served import ServedService
-from trigpoint_cli.settings import Settings, configuration_options, configured_settings
+from trigpoint_cli.settings import Settings, configuration_options, configured_settings, secrets_of
 from trigpoint_cli.stopping import StopRequests, stop_requests
 
-SERVICES = {
-    "ingest": "trigpoint_cli.serving.ingest",
-    "filtering": "trigpoint_cli.serving.filtering",
-    "optimisation": "trigpoint_cli.serving.optimisation",
-    "landmarks": "trigpoint_cli.serving.landmarks",
-}
+SERVICES = ("ingest", "filtering", "optimisation", "landmarks")
 LOOK_S = 0.2  # between two looks whether the service still works
 STUCK = 1  # exit status of a process that could not finish in time
 
@@ -32,56 +29,71 @@ Opener = Callable[[Settings, Instruments], AbstractContextManager[Service]]
 logger = logging.getLogger(__name__)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ran:
+    """A process that was told to stop, and why."""
+
+    process: str
+    reason: str
+
+    def answer(self) -> Answer:
+        """What the command says."""
+        return Answer({"process": self.process, "stopped_by": self.reason}, (f"{self.process}: {self.reason}",))
+
+
 @click.command("serve")
-@click.argument("service", type=click.Choice(sorted(SERVICES)))
+@click.argument("service", type=click.Choice(SERVICES))
 @configuration_options
 @click.option("--until-input-ends", is_flag=True, help="Stop when standard input ends, as it does with its writer.")
-def command(service: str, config: Path | None, flags: tuple[str, ...], *, until_input_ends: bool) -> None:
+@answering
+def command(
+    service: str, config: Path | None, flags: tuple[str, ...], *, until_input_ends: bool, screen: Screen
+) -> Answer:
     """Run one service until SIGTERM or SIGINT; what it began is finished first, within [serve] stop_limit_s."""
     settings = configured_settings(config, flags).settings
-    log_to(service, level=settings.logging.level, form=settings.logging.form)
-    instruments = Instruments(service)
+    return run_process(service, settings, until_input_ends=until_input_ends).answer()
+
+
+def run_process(process: str, settings: Settings, *, until_input_ends: bool) -> Ran:
+    """The process's service ran until it was told to stop. Raises what ended it otherwise."""
+    log_to(process, level=settings.logging.level, form=settings.logging.form, secrets=secrets_of(settings))
+    instruments = Instruments(process)
     with stop_requests(with_standard_input=until_input_ends) as requests:
-        opener = _opener(service)
+        opener: Opener = importlib.import_module(f"trigpoint_cli.serving.{process}").opened
         served = ServedService(lambda: opener(settings, instruments), instruments)
-        serve_until_stopped(served, settings, requests)
+        reason = serve_until_stopped(served, settings, requests)
+    logger.info("stopped", extra={"reason": reason})
+    return Ran(process=process, reason=reason)
 
 
-def serve_until_stopped(served: ServedService, settings: Settings, requests: StopRequests) -> None:
-    """The service runs until there is a request to stop. Raises what ended it otherwise."""
+def serve_until_stopped(served: ServedService, settings: Settings, requests: StopRequests) -> str:
+    """Why the service was told to stop. Raises what ended it otherwise."""
+    reason = None
     with endpoint_of(served.name, settings, served):
         served.start()
-        while served.is_alive():
+        while served.is_alive() and reason is None:
             reason = requests.wait(LOOK_S)
-            if reason is not None:
-                _stop(served, reason, settings.serve.stop_limit_s)
-                break
+        if reason is not None:
+            _stop(served, reason, settings.serve.stop_limit_s)
     if served.error is not None:
         raise served.error
-    logger.info("stopped", extra={"stage": served.stage.value})
+    return reason or "its own end"
 
 
 def endpoint_of(process: str, settings: Settings, health: Health) -> AbstractContextManager[object]:
-    """The process's HTTP endpoint while it is open, if the configuration wants one."""
+    """The process's HTTP endpoint while it is open, if the configuration wants one. Raises ServiceError."""
     http = settings.http
     if not http.enabled:
         return nullcontext()
-    endpoint = Endpoint(
-        EndpointSettings(
-            host=http.host,
-            port=http.ports()[process],
-            parallel_limit=http.parallel_limit,
-            request_timeout_s=http.request_timeout_s,
-        ),
-        health,
+    chosen = EndpointSettings(
+        host=http.host,
+        port=http.ports()[process],
+        parallel_limit=http.parallel_limit,
+        request_timeout_s=http.request_timeout_s,
     )
+    endpoint = Endpoint(chosen, health)
     logger.info("answering", extra={"address": endpoint.address})
     return endpoint
-
-
-def _opener(service: str) -> Opener:
-    opener: Opener = importlib.import_module(SERVICES[service]).opened
-    return opener
 
 
 def _stop(served: ServedService, reason: str, limit_s: float) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
+from urllib.parse import unquote, urlsplit
 
 import click
 
@@ -21,10 +22,15 @@ from trigpoint.configuration.sections import (
     TracingSettings,
     UpSettings,
 )
+from trigpoint.errors import InputError
+from trigpoint.observability.log_lines import Secrets
 from trigpoint_filtering.settings import FilterSettings
 from trigpoint_ingest.settings import IngestSettings
 from trigpoint_optimisation.settings import SolveSettings
 
+ROUTER_ENDPOINT = "tcp/127.0.0.1:7447"
+ROUTER = ZenohSettings(mode="router", listen=(ROUTER_ENDPOINT,))
+CLIENT_OF_ROUTER = ZenohSettings(mode="client", connect=(ROUTER_ENDPOINT,), connect_timeout_s=10.0)
 NAMES_OF_FLEET = SetElsewhere((("root", "fleet.root"), ("map_name", "fleet.map")))
 
 
@@ -33,12 +39,12 @@ class Settings:
     """One section a field; `trigpoint config show` prints them."""
 
     fleet: FleetSettings
-    bus: ZenohSettings = field(default_factory=ZenohSettings)
+    bus: ZenohSettings = field(default_factory=lambda: CLIENT_OF_ROUTER)
     database: DatabaseSettings = field(default_factory=DatabaseSettings)
     ingest: Annotated[IngestSettings, NAMES_OF_FLEET] = field(default_factory=IngestSettings)
     filtering: FilterSettings = field(default_factory=FilterSettings)
     optimisation: SolveSettings = field(default_factory=SolveSettings)
-    router: ZenohSettings = field(default_factory=lambda: ZenohSettings(mode="router", listen=("tcp/127.0.0.1:7447",)))
+    router: ZenohSettings = field(default_factory=lambda: ROUTER)
     up: UpSettings = field(default_factory=UpSettings)
     serve: ServeSettings = field(default_factory=ServeSettings)
     http: HttpSettings = field(default_factory=HttpSettings)
@@ -50,6 +56,26 @@ def configured_settings(file: Path | None, flags: Sequence[str]) -> Configured[S
     """The settings from flags, over the environment, over a file. Raises ConfigurationRefused, InputError."""
     layers = [from_environment(os.environ), from_flags(flags)]
     return configured(Settings, layers if file is None else [from_toml(file), *layers])
+
+
+def password_of(database: DatabaseSettings) -> str | None:
+    """The database's password: the content of its file, without the end of the line. Raises InputError."""
+    if database.password_file is None:
+        return None
+    try:
+        return database.password_file.read_text(encoding="utf-8").rstrip("\n")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"[database] password_file {database.password_file}: cannot be read: {error}") from error
+
+
+def secrets_of(settings: Settings) -> Secrets:
+    """What must not be logged. Raises InputError where a file of it cannot be read."""
+    secrets = Secrets()
+    in_url = urlsplit(settings.database.url).password
+    for text in (password_of(settings.database), in_url, in_url and unquote(in_url)):
+        if text:
+            secrets.add(text)
+    return secrets
 
 
 def configuration_options(function: Callable[..., Any]) -> Callable[..., Any]:

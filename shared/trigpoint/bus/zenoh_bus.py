@@ -4,39 +4,41 @@ import contextlib
 import json
 import threading
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Self, cast
+from typing import Literal, Self, cast
 
 import zenoh
 
-from trigpoint.bus.attachment import (
-    bundled_count,
-    decode_attachment,
-    decode_bundle,
-    encode_attachment,
-    encode_bundle,
-    is_bundle,
-)
-from trigpoint.bus.inbox import INBOX_CAPACITY, Inbox
+from trigpoint.bus.arrivals import Arrival, messages_of, runs_of, runs_of_messages
+from trigpoint.bus.attachment import encode_attachment, encode_bundle, run_attachments
+from trigpoint.bus.inbox import INBOX_BYTES, INBOX_CAPACITY, Inbox
 from trigpoint.bus.key_expressions import checked_expression, checked_key
-from trigpoint.bus.ports import UNIDENTIFIED, BusMessage
-from trigpoint.errors import InputError, ServiceError
+from trigpoint.bus.ports import BusMessage, BusRun
+from trigpoint.errors import ServiceError
 
 PROTOBUF = "application/protobuf"
-BUNDLE_LIMIT = 256  # messages in a transmission: some 15 kB of IMU, below the 64 kB a Zenoh batch holds
+BUNDLE_COUNT = 256  # messages in a transmission: some 15 kB of IMU, below the 64 kB a Zenoh batch holds
+BUNDLE_BYTES = 64 * 1024  # of payload in a transmission of more than one message
+CLAIM_LOOK_S = 5.0  # for the claims of everyone reachable; the answer comes in milliseconds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ZenohSettings:
-    """A peer's endpoints such as "tcp/127.0.0.1:7447"; scouting finds peers without endpoints, by multicast."""
+    """A session's endpoints such as "tcp/127.0.0.1:7447"; scouting finds peers without endpoints, by multicast.
+
+    A client waits `connect_timeout_s` for its first connection; a later one comes back by itself.
+    """
 
     listen: tuple[str, ...] = ()
     connect: tuple[str, ...] = ()
-    mode: str = "peer"
+    mode: Literal["peer", "client", "router"] = "peer"
+    connect_timeout_s: float = 0.0
     scouting: bool = False
     inbox_capacity: int = INBOX_CAPACITY
+    inbox_bytes: int = INBOX_BYTES
+    message_limit_bytes: int = 64 * 1024 * 1024
 
 
 def _config(settings: ZenohSettings) -> zenoh.Config:
@@ -45,8 +47,10 @@ def _config(settings: ZenohSettings) -> zenoh.Config:
         ("mode", settings.mode),
         ("listen/endpoints", list(settings.listen)),
         ("connect/endpoints", list(settings.connect)),
+        ("connect/timeout_ms", {"client": round(1e3 * settings.connect_timeout_s)}),
         ("scouting/multicast/enabled", settings.scouting),
         ("scouting/gossip/enabled", settings.scouting),
+        ("transport/link/rx/max_message_size", settings.message_limit_bytes),
     ):
         config.insert_json5(name, json.dumps(value))
     return config
@@ -56,60 +60,31 @@ def _attachment(message: BusMessage) -> bytes:
     return encode_attachment(message.identity, stamp_ns=message.stamp_ns, schema_version=message.schema_version)
 
 
-@dataclass(frozen=True, slots=True)
-class _Arrival:
-    """A sample's content, copied out of the transport's buffers."""
-
-    key: str
-    encoding: str
-    payload: bytes
-    attachment: bytes
-
-
-def _messages(arrival: _Arrival) -> list[BusMessage]:
-    """What arrived in one transmission, at least one; as one UNIDENTIFIED message whatever is not ours."""
-    if not is_bundle(arrival.attachment):
-        return [_message(arrival, arrival.attachment, arrival.payload)]
-    with contextlib.suppress(InputError):
-        bundled = [_message(arrival, attachment, payload) for attachment, payload in decode_bundle(arrival.payload)]
-        if bundled:  # nobody of ours sends an empty one
-            return bundled
-    return [_message(arrival, b"", arrival.payload)]
-
-
-def _message(arrival: _Arrival, attachment: bytes, payload: bytes) -> BusMessage:
-    try:
-        identity, stamp_ns, schema_version = decode_attachment(attachment)
-    except InputError:  # a foreign sender: delivered as UNIDENTIFIED, so that the receiver can refuse and keep it
-        identity, stamp_ns, schema_version = UNIDENTIFIED, 0, 0
-    return BusMessage(
-        key=arrival.key,
-        schema_name=arrival.encoding.partition(";")[2],
-        payload=payload,
-        identity=identity,
-        stamp_ns=stamp_ns,
-        schema_version=schema_version,
-    )
-
-
 class ZenohSubscription:
     """Messages of one expression; made by ZenohBus.subscribe. The transport's callback only queues them."""
 
-    def __init__(self, session: zenoh.Session, key_expression: str, capacity: int) -> None:
-        self._inbox: Inbox[_Arrival] = Inbox(capacity)
+    def __init__(self, session: zenoh.Session, key_expression: str, inbox: Inbox[Arrival]) -> None:
+        self._inbox = inbox
         self._unpacked: deque[BusMessage] = deque()
+        self._runs: deque[BusRun] = deque()
         self._subscriber = session.declare_subscriber(key_expression, self._arrived)
 
     def _arrived(self, sample: zenoh.Sample) -> None:
         attached = sample.attachment
         attachment = attached.to_bytes() if attached is not None else b""
-        arrival = _Arrival(str(sample.key_expr), str(sample.encoding), sample.payload.to_bytes(), attachment)
-        self._inbox.offer(arrival, count=bundled_count(attachment, arrival.payload))
+        schema_name = str(sample.encoding).partition(";")[2]
+        arrival = Arrival(str(sample.key_expr), schema_name, sample.payload.to_bytes(), attachment)
+        self._inbox.offer(arrival, count=arrival.count, size_bytes=len(arrival.payload))
 
     @property
     def lost(self) -> int:
         """How many messages were dropped because the queue was full."""
         return self._inbox.lost
+
+    @property
+    def waiting(self) -> int:
+        """How many messages wait to be received."""
+        return self._inbox.held + len(self._unpacked) + sum(len(run.run) for run in self._runs)
 
     def receive(self, timeout_s: float) -> BusMessage | None:
         """The next message, or None if none came within `timeout_s` or the subscription is closed."""
@@ -117,15 +92,40 @@ class ZenohSubscription:
             arrival = self._inbox.take(timeout_s)
             if arrival is None:
                 return None
-            self._unpacked.extend(_messages(arrival))
+            self._unpacked.extend(messages_of(arrival))
         return self._unpacked.popleft()
+
+    def receive_run(self, timeout_s: float) -> BusRun | None:
+        """The next messages that came together, or None if none came within `timeout_s` or it is closed."""
+        if self._unpacked:
+            self._runs.extend(runs_of_messages(self._unpacked))
+            self._unpacked.clear()
+        if not self._runs:
+            arrival = self._inbox.take(timeout_s)
+            if arrival is None:
+                return None
+            self._runs.extend(runs_of(arrival))
+        return self._runs.popleft()
 
     def close(self) -> None:
         """No more messages; ones not yet received are dropped."""
         self._inbox.close()
         self._unpacked.clear()
+        self._runs.clear()
         with contextlib.suppress(zenoh.ZError):  # already undeclared, or its session is gone
             self._subscriber.undeclare()  # type: ignore[no-untyped-call]
+
+
+class ZenohClaim:
+    """A claimed key, a liveliness token; made by ZenohBus.claim."""
+
+    def __init__(self, token: zenoh.LivelinessToken) -> None:
+        self._token = token
+
+    def release(self) -> None:
+        """The key no longer claimed."""
+        with contextlib.suppress(zenoh.ZError):  # already undeclared, or its session is gone
+            self._token.undeclare()  # type: ignore[no-untyped-call]
 
 
 class ZenohBus:
@@ -143,7 +143,7 @@ class ZenohBus:
 
     def publish(self, message: BusMessage) -> None:
         """The message handed to Zenoh; no promise that anyone got it."""
-        self._put(message, message.payload, _attachment(message))
+        self._put(message.key, message.schema_name, message.payload, _attachment(message))
 
     def publish_all(self, messages: Sequence[BusMessage]) -> None:
         """The messages handed to Zenoh, those of one key and schema in bundles; only they keep their order."""
@@ -151,19 +151,28 @@ class ZenohBus:
         for message in messages:
             groups.setdefault((message.key, message.schema_name), []).append(message)
         for group in groups.values():
-            for first in range(0, len(group), BUNDLE_LIMIT):
-                self._put_bundle(group[first : first + BUNDLE_LIMIT])
+            for start, stop in _bundles([message.payload for message in group]):
+                self._put_bundle(group[start:stop])
 
     def _put_bundle(self, messages: Sequence[BusMessage]) -> None:
         attachment, payload = encode_bundle([(_attachment(message), message.payload) for message in messages])
-        self._put(messages[0], payload, attachment)
+        self._put(messages[0].key, messages[0].schema_name, payload, attachment)
 
-    def _put(self, message: BusMessage, payload: bytes, attachment: bytes) -> None:
-        publisher = self._publisher(message.key, message.schema_name)
+    def publish_run(self, run: BusRun) -> None:
+        """The run handed to Zenoh in bundles."""
+        rows = run.run
+        attachments = run_attachments(rows, schema_version=run.schema_version)
+        for start, stop in _bundles(rows.payloads):
+            parts = list(zip(attachments[start:stop], rows.payloads[start:stop], strict=True))
+            attachment, payload = encode_bundle(parts)
+            self._put(run.key, rows.schemas[0], payload, attachment)
+
+    def _put(self, key: str, schema_name: str, payload: bytes, attachment: bytes) -> None:
+        publisher = self._publisher(key, schema_name)
         try:
             publisher.put(payload, attachment=attachment)
         except zenoh.ZError as error:
-            raise ServiceError(f"nothing could be published on {message.key}: {error}") from error
+            raise ServiceError(f"nothing could be published on {key}: {error}") from error
 
     def _publisher(self, key: str, schema_name: str) -> zenoh.Publisher:
         self._require_open()
@@ -182,11 +191,24 @@ class ZenohBus:
     def subscribe(self, key_expression: str) -> ZenohSubscription:
         """A subscription to all keys the expression matches."""
         self._require_open()
-        subscription = ZenohSubscription(
-            self._session, checked_expression(key_expression), self._settings.inbox_capacity
-        )
+        inbox: Inbox[Arrival] = Inbox(self._settings.inbox_capacity, capacity_bytes=self._settings.inbox_bytes)
+        subscription = ZenohSubscription(self._session, checked_expression(key_expression), inbox)
         self._subscriptions.append(subscription)
         return subscription
+
+    def claim(self, key: str) -> ZenohClaim:
+        """The key claimed by a liveliness token: gone when the session's links are."""
+        self._require_open()
+        try:
+            return ZenohClaim(self._session.liveliness().declare_token(checked_key(key)))
+        except zenoh.ZError as error:
+            raise ServiceError(f"{key} could not be claimed: {error}") from error
+
+    def claimed(self, key_expression: str) -> tuple[str, ...]:
+        """The keys with a liveliness token that match, of every session reachable now."""
+        self._require_open()
+        replies = self._session.liveliness().get(checked_expression(key_expression), timeout=CLAIM_LOOK_S)
+        return tuple(sorted({str(reply.ok.key_expr) for reply in replies if reply.ok is not None}))
 
     def has_listener(self, key: str) -> bool:
         """Whether Zenoh knows of a subscription that matches the key."""
@@ -225,3 +247,15 @@ class ZenohBus:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _bundles(payloads: Sequence[bytes]) -> Iterator[tuple[int, int]]:
+    """Half-open ranges of payloads to be sent together."""
+    start, size_bytes = 0, 0
+    for index, payload in enumerate(payloads):
+        if index > start and (index - start >= BUNDLE_COUNT or size_bytes + len(payload) > BUNDLE_BYTES):
+            yield start, index
+            start, size_bytes = index, 0
+        size_bytes += len(payload)
+    if start < len(payloads):
+        yield start, len(payloads)
