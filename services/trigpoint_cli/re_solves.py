@@ -47,7 +47,7 @@ def agreement_with_re_solves(solved: Solved, reduction: LabelReduction, tied: In
 
 def _full_residuals_m(solved: Solved, reduction: LabelReduction, tied: Ints, held_out: Ints) -> Floats:
     """Held-out labels minus their landmarks and image offsets (h, 2) in m, after a solve with `tied` labels."""
-    rows = np.array([solved.labels.name.index(name) for name in reduction.labels])
+    rows = np.nonzero(solved.assignment.landmark >= 0)[0]  # the labels the reduction has, in its order
     landmark = np.full(len(solved.labels.name), UNASSIGNED)
     landmark[rows[tied]] = solved.assignment.landmark[rows[tied]]
     chosen = replace(solved, assignment=replace(solved.assignment, landmark=landmark))

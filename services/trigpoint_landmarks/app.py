@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
-from trigpoint.events.corrected import AnchorLabelled
+from trigpoint.events.corrected import AnchorLabelled, Corrected
 from trigpoint.events.envelope import Envelope, LogPosition
 from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.mapped import Mapped, MapSolved
@@ -41,7 +41,7 @@ def project(log: EventLog, store: LandmarkStore, *, progress: Progress = in_sile
     `progress` gets events read and events there are. A version whose events are not whole is refused and counted;
     the next one goes on. Raises InputError if versions are there and no frame is pinned; ServiceError from the store.
     """
-    labelled = tuple(_labels(log))
+    corrected = tuple(_corrections(log))
     valid = {landmark.landmark: landmark for landmark in store.landmarks(LandmarkQuery())}
     newest = max((version.map_version for version in store.map_versions()), default=0)
     applied: list[int] = []
@@ -53,7 +53,7 @@ def project(log: EventLog, store: LandmarkStore, *, progress: Progress = in_sile
             refused.append((version.solved.map_version, reason))
             continue
         frame = frame or logged_frame(log)
-        labels = labels_within(labelled, version.solved.inputs)
+        labels = labels_within(corrected, version.solved.inputs)
         change = map_change(version, frame=frame, labels=labels, valid=valid)
         store.apply(change, store.checkpoint().after(version.position))
         valid, newest = valid_after(valid, change), version.solved.map_version
@@ -94,7 +94,7 @@ def _mapped(log: EventLog, first_number: int, progress: Progress) -> Iterator[Lo
         progress(done, total)
 
 
-def _labels(log: EventLog) -> Iterator[tuple[LogPosition, AnchorLabelled]]:
-    for logged in log.read(LABEL_STREAM, kinds=(AnchorLabelled,)):
-        if isinstance(logged.envelope.event, AnchorLabelled):
+def _corrections(log: EventLog) -> Iterator[tuple[LogPosition, Corrected]]:
+    for logged in log.read(LABEL_STREAM):
+        if isinstance(logged.envelope.event, Corrected):
             yield logged.position, logged.envelope.event

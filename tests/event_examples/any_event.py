@@ -144,6 +144,7 @@ ANY_EVENT: dict[type, SearchStrategy[object]] = {
         landmark=any_text,
         reason=any_text,
         residual_m=_array(2),
+        image=any_text,
     ),
     ImageOffsetSolved: st.builds(
         ImageOffsetSolved, map_version=any_int, image=any_text, offset_m=_array(2), covariance_m2=_array(2, 2)

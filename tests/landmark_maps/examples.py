@@ -71,6 +71,7 @@ def landmark(name: str, x_m: float, y_m: float, *, map_version: int = 1, kind: s
 def version_row(map_version: int = 1, *, landmark_count: int = 0, crs: str = CRS) -> MapVersion:
     return MapVersion(
         map_version=map_version,
+        base_version=0,
         method="anchored",
         settings_json="{}",
         inputs_json="[]",
@@ -230,4 +231,4 @@ def whole_change(map_version: int = 1) -> MapChange:
         for number, event in enumerate(events)
     ]
     (version,) = solved_versions(rows)
-    return map_change(version, frame=frame(), labels={"anchor-1": label("anchor-1")}, valid={})
+    return map_change(version, frame=frame(), labels={("anchor-1", "tile-1"): label("anchor-1")}, valid={})

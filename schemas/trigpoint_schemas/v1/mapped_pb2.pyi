@@ -117,18 +117,20 @@ class LandmarkSolved(_message.Message):
     def __init__(self, map_version: _Optional[int] = ..., landmark: _Optional[str] = ..., kind: _Optional[str] = ..., signature: _Optional[str] = ..., position_m: _Optional[_Iterable[float]] = ..., covariance_m2: _Optional[_Iterable[float]] = ..., observation_count: _Optional[int] = ..., vehicles: _Optional[_Iterable[str]] = ..., first_seen_ns: _Optional[int] = ..., last_seen_ns: _Optional[int] = ..., anchors: _Optional[_Iterable[str]] = ..., observations: _Optional[_Iterable[_Union[SweepReference, _Mapping[str, object]]]] = ...) -> None: ...
 
 class AnchorAssociated(_message.Message):
-    __slots__ = ("map_version", "anchor", "landmark", "reason", "residual_m")
+    __slots__ = ("map_version", "anchor", "landmark", "reason", "residual_m", "image")
     MAP_VERSION_FIELD_NUMBER: _ClassVar[int]
     ANCHOR_FIELD_NUMBER: _ClassVar[int]
     LANDMARK_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
     RESIDUAL_M_FIELD_NUMBER: _ClassVar[int]
+    IMAGE_FIELD_NUMBER: _ClassVar[int]
     map_version: int
     anchor: str
     landmark: str
     reason: str
     residual_m: _containers.RepeatedScalarFieldContainer[float]
-    def __init__(self, map_version: _Optional[int] = ..., anchor: _Optional[str] = ..., landmark: _Optional[str] = ..., reason: _Optional[str] = ..., residual_m: _Optional[_Iterable[float]] = ...) -> None: ...
+    image: str
+    def __init__(self, map_version: _Optional[int] = ..., anchor: _Optional[str] = ..., landmark: _Optional[str] = ..., reason: _Optional[str] = ..., residual_m: _Optional[_Iterable[float]] = ..., image: _Optional[str] = ...) -> None: ...
 
 class ImageOffsetSolved(_message.Message):
     __slots__ = ("map_version", "image", "offset_m", "covariance_m2")

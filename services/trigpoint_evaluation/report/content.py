@@ -19,6 +19,8 @@ from trigpoint_evaluation.core.paths import path_length_m
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+NOT_RECORDED = ""  # the image of an association written before images were named there
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UntiedResiduals:
@@ -127,11 +129,11 @@ def anchor_pictures(content: ReportContent) -> tuple[AnchorPicture, ...]:
         return ()
     lat_deg, lon_deg = np.array([one.lat_deg for one in anchors]), np.array([one.lon_deg for one in anchors])
     label_m = map_points_from_wgs84(lat_deg, lon_deg, content.evaluated.frame)
-    associated = {one.anchor: one for one in solved.anchors}
+    associated = {(one.anchor, one.image): one for one in solved.anchors}
     landmark_m = {one.landmark: one.position_m for one in solved.landmarks}
     pictures = []
     for anchor, point_m in zip(anchors, label_m, strict=True):
-        found = associated.get(anchor.anchor)
+        found = associated.get((anchor.anchor, anchor.image), associated.get((anchor.anchor, NOT_RECORDED)))
         tied = found is not None and bool(found.landmark)
         pictures.append(
             AnchorPicture(

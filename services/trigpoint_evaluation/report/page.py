@@ -151,12 +151,12 @@ def _zoom_extent(drawn: _Drawn) -> tuple[str, Extent | None]:
 
 
 def _residual_section(drawn: _Drawn) -> Section | None:
-    after = {one.anchor.anchor: one.residual_m for one in drawn.anchors if one.residual_m is not None}
+    after = [one.residual_m for one in drawn.anchors if one.residual_m is not None]
     untied = drawn.content.untied
     if not after or untied is None or not np.isfinite(untied.residual_m).any():
         return None
     before_m = untied.residual_m
-    after_m = np.array(list(after.values()))
+    after_m = np.array(after)
     before, left = (summary_of(np.hypot(one[:, 0], one[:, 1])) for one in (before_m, after_m))
     text = (
         f"Before anchors are tied the labels lie {number(before.mean)} m from the map on average; after, "

@@ -66,6 +66,6 @@ def _key(row: MapRow) -> RowKey:
         case Trajectory():
             return "trajectories", f"{row.vehicle}/{row.boot_id} of version {row.map_version}"
         case Anchor():
-            return "anchors", f"{row.anchor} of version {row.map_version}"
+            return "anchors", f"{row.anchor} in {row.image or 'the survey'} of version {row.map_version}"
         case ImageOffset():
             return "image_offsets", f"{row.image} of version {row.map_version}"

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from trigpoint.events.corrected import AnchorLabelled
+from trigpoint.events.corrected import AnchorLabelled, Corrected, anchors_in_force
 from trigpoint.events.envelope import LogPosition
 from trigpoint.events.mapped import AnchorAssociated, ImageOffsetSolved, LandmarkSolved, TrajectorySolved
 from trigpoint.geodesy.positions import Wgs84Position
@@ -26,18 +26,20 @@ from trigpoint.landmarks.model import (
 from trigpoint_landmarks.core.versions import SolvedVersion
 
 Floats = NDArray[np.float64]
-Labels = Mapping[str, AnchorLabelled]
+Labels = Mapping[tuple[str, str], AnchorLabelled]  # by name and image
 
 
 def labels_within(
-    labelled: Iterable[tuple[LogPosition, AnchorLabelled]], inputs: Sequence[tuple[str, int]]
-) -> dict[str, AnchorLabelled]:
-    """The last label of each anchor among a version's inputs (stream, count): what its solve could know.
+    corrected: Iterable[tuple[LogPosition, Corrected]], inputs: Sequence[tuple[str, int]]
+) -> dict[tuple[str, str], AnchorLabelled]:
+    """The label in force of each anchor, by name and image, among a version's inputs (stream, count): what its solve
+    could know.
 
-    A label added or mended later says nothing about an earlier version, however late that is projected.
+    A label added, mended or retracted later says nothing about an earlier version, however late that is projected.
     """
     counts = dict(inputs)
-    return {label.anchor: label for position, label in labelled if position.number < counts.get(position.stream, 0)}
+    known = (correction for position, correction in corrected if position.number < counts.get(position.stream, 0))
+    return {(label.anchor, label.image): label for label in anchors_in_force(known)}
 
 
 def map_change(version: SolvedVersion, *, frame: MapFrame, labels: Labels, valid: Mapping[str, Landmark]) -> MapChange:
@@ -52,7 +54,7 @@ def map_change(version: SolvedVersion, *, frame: MapFrame, labels: Labels, valid
         opened=tuple(row for name, row in solved.items() if name not in kept),
         closed=tuple(name for name in valid if name not in kept),
         trajectories=tuple(_trajectory_row(row, frame) for row in version.trajectories),
-        anchors=tuple(_anchor_row(row, labels.get(row.anchor), frame) for row in version.anchors),
+        anchors=tuple(_anchor_row(row, _label_of(row, labels), frame) for row in version.anchors),
         image_offsets=tuple(_offset_row(row) for row in version.image_offsets),
     )
 
@@ -113,6 +115,7 @@ def _version_row(version: SolvedVersion, frame: MapFrame) -> MapVersion:
     solved = version.solved
     return MapVersion(
         map_version=solved.map_version,
+        base_version=solved.base_version,
         method=solved.method,
         settings_json=solved.settings_json,
         inputs_json=json.dumps(solved.inputs),
@@ -146,13 +149,19 @@ def _trajectory_row(row: TrajectorySolved, frame: MapFrame) -> Trajectory:
     )
 
 
+def _label_of(row: AnchorAssociated, labels: Labels) -> AnchorLabelled | None:
+    """The anchor's label; of an association that names no image and is of no survey, the last of its name."""
+    named = [label for (anchor, _), label in labels.items() if anchor == row.anchor] if not row.image else []
+    return labels.get((row.anchor, row.image), named[-1] if named else None)
+
+
 def _anchor_row(row: AnchorAssociated, label: AnchorLabelled | None, frame: MapFrame) -> Anchor:
     x_m, y_m = float(row.residual_m[0]), float(row.residual_m[1])
     placed = None if label is None else map_from_wgs84(Wgs84Position(label.lat_deg, label.lon_deg), frame)
     return Anchor(
         map_version=row.map_version,
         anchor=row.anchor,
-        image=label.image if label else "",
+        image=label.image if label else row.image,
         kind=label.kind if label else "",
         signature=label.signature if label else "",
         landmark=row.landmark,

@@ -79,7 +79,7 @@ def _closed(
         solved=solved,
         landmarks=tuple({row.landmark: row for row in _of(events, LandmarkSolved)}.values()),
         trajectories=tuple({(row.vehicle, row.boot_id): row for row in _of(events, TrajectorySolved)}.values()),
-        anchors=tuple({row.anchor: row for row in _of(events, AnchorAssociated)}.values()),
+        anchors=tuple({(row.anchor, row.image): row for row in _of(events, AnchorAssociated)}.values()),
         image_offsets=tuple({row.image: row for row in _of(events, ImageOffsetSolved)}.values()),
     )
 

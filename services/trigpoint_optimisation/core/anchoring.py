@@ -22,10 +22,12 @@ BEYOND_BELIEF = "residual"  # how the reason begins for a label that was tied, s
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Labels:
-    """All labels (a,): name, position label_m (a, 2) in the map, sigma_m (a,), image (a,) or NO_IMAGE; kind and
-    signature as labelled; `images` names, image_sigma_m (k,)."""
+    """All labels (a,): name, image they were `labelled_in` (empty: a survey), position label_m (a, 2) in the map,
+    sigma_m (a,), image (a,) whose offset they share or NO_IMAGE; kind and signature as labelled; `images` names,
+    image_sigma_m (k,)."""
 
     name: tuple[str, ...]
+    labelled_in: tuple[str, ...]
     label_m: Floats
     sigma_m: Floats
     image: Ints
@@ -52,6 +54,7 @@ def labels_of(anchors: Sequence[AnchorLabelled], frame: MapFrame, *, image_offse
     sigma = {anchor.image: anchor.image_sigma_m for anchor in anchors}
     return Labels(
         name=tuple(anchor.anchor for anchor in anchors),
+        labelled_in=tuple(anchor.image for anchor in anchors),
         label_m=map_points_from_wgs84(lat, lon, frame) if len(anchors) else np.zeros((0, 2)),
         sigma_m=np.array([anchor.sigma_m for anchor in anchors], dtype=np.float64),
         image=np.array([images.index(name) if name else NO_IMAGE for name in offset], dtype=np.int64),

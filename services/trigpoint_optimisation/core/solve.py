@@ -295,6 +295,7 @@ def _anchors(solved: Solved, landmark: Sequence[str]) -> tuple[AnchorAssociated,
             landmark=landmark[found] if found >= 0 else "",
             reason=assignment.reason[row],
             residual_m=residual[row],
+            image=labels.labelled_in[row],
         )
         for row, (name, found) in enumerate(zip(labels.name, assignment.landmark, strict=True))
     )

@@ -110,6 +110,7 @@ def no_labels() -> tuple[Labels, Assignment]:
     none = np.zeros(0, dtype=np.int64)
     labels = Labels(
         name=(),
+        labelled_in=(),
         label_m=np.zeros((0, 2)),
         sigma_m=np.zeros(0),
         image=none,

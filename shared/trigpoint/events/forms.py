@@ -264,6 +264,7 @@ def _association_message(event: AnchorAssociated) -> mapped_pb2.AnchorAssociated
         landmark=event.landmark,
         reason=event.reason,
         residual_m=_listed(event.residual_m, (2,)),
+        image=event.image,
     )
 
 
@@ -274,6 +275,7 @@ def _association_event(message: mapped_pb2.AnchorAssociated) -> AnchorAssociated
         landmark=message.landmark,
         reason=message.reason,
         residual_m=_array(message.residual_m, (2,)),
+        image=message.image,
     )
 
 

@@ -71,7 +71,8 @@ class LandmarkSolved:
 class AnchorAssociated:
     """What became of one anchor: the landmark it was tied to (or "" and why not) and the residual left.
 
-    residual (2,): label minus landmark minus image offset, m.
+    residual (2,): label minus landmark minus image offset, m. `image` is the one it was labelled in, empty for a
+    survey and in what was written before images were named here: an anchor is known by its name and its image.
     """
 
     map_version: int
@@ -79,6 +80,7 @@ class AnchorAssociated:
     landmark: str
     reason: str
     residual_m: Floats
+    image: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -87,7 +87,7 @@ def _upon(base: SolvedMap, change: SolvedMap) -> SolvedMap:
         head=change.head,
         trajectories=tuple(paths.values()),
         landmarks=tuple(one for name, one in landmarks.items() if name not in removed),
-        anchors=tuple({one.anchor: one for one in (*base.anchors, *change.anchors)}.values()),
+        anchors=tuple({(one.anchor, one.image): one for one in (*base.anchors, *change.anchors)}.values()),
         images=tuple({one.image: one for one in (*base.images, *change.images)}.values()),
     )
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,14 +12,17 @@ from landmark_maps.examples import (
     MAP_STREAM,
     ORIGIN,
     START_NS,
+    associated,
+    closing,
     frame,
     label,
     solved_landmark,
     solved_map,
     whole_change,
 )
+from trigpoint.events.corrected import AnchorRetracted, Corrected
 from trigpoint.events.envelope import Envelope, EventIdentity, LogPosition
-from trigpoint.events.mapped import LandmarkSolved
+from trigpoint.events.mapped import LandmarkSolved, Mapped
 from trigpoint.landmarks.model import MapChange
 from trigpoint_landmarks.core.rows import labels_within, map_change, valid_after
 from trigpoint_landmarks.core.versions import solved_versions
@@ -102,8 +106,33 @@ def test_an_anchor_whose_label_was_not_among_the_inputs_has_no_place() -> None:
 
 def test_a_label_mended_after_the_solve_says_nothing_about_it() -> None:
     labelled = [(LogPosition(LABEL_STREAM, n), label("anchor-1", lat_deg=-33.0 - n)) for n in range(3)]
-    assert labels_within(labelled, [(LABEL_STREAM, 2)])["anchor-1"].lat_deg == -34.0
+    assert labels_within(labelled, [(LABEL_STREAM, 2)])["anchor-1", "tile-1"].lat_deg == -34.0
     assert labels_within(labelled, [("other", 2)]) == {}
+
+
+def test_a_label_retracted_after_the_solve_still_belongs_to_it() -> None:
+    retracted = AnchorRetracted(anchor="anchor-1", image="tile-1", author="surveyor", reason="moved")
+    events: list[Corrected] = [label("anchor-1"), retracted]
+    corrected = [(LogPosition(LABEL_STREAM, n), event) for n, event in enumerate(events)]
+    assert list(labels_within(corrected, [(LABEL_STREAM, 1)])) == [("anchor-1", "tile-1")]
+    assert labels_within(corrected, [(LABEL_STREAM, 2)]) == {}
+
+
+def test_one_name_in_two_images_is_two_anchors() -> None:
+    north = replace(label("anchor-1", lat_deg=-33.0), image="tile-2")
+    labels = {("anchor-1", "tile-1"): label("anchor-1"), ("anchor-1", "tile-2"): north}
+    events: list[Mapped] = [
+        replace(associated("anchor-1", "L1"), image="tile-1"),
+        replace(associated("anchor-1", "L1"), image="tile-2"),
+        closing(1, 0),
+    ]
+    rows = [
+        (LogPosition(MAP_STREAM, number), Envelope(EventIdentity("optimisation", "boot-1", number), START_NS, event))
+        for number, event in enumerate(events)
+    ]
+    (version,) = solved_versions(rows)
+    anchors = map_change(version, frame=frame(), labels=labels, valid={}).anchors
+    assert [(row.image, row.lat_deg) for row in anchors] == [("tile-1", -33.89), ("tile-2", -33.0)]
 
 
 def test_an_empty_map_has_no_rows() -> None:

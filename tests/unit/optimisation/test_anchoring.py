@@ -40,6 +40,7 @@ def labels_at(label_m: Floats, *, image: int = NO_IMAGE) -> Labels:
     count = len(label_m)
     return Labels(
         name=tuple(f"a{row}" for row in range(count)),
+        labelled_in=("" if image == NO_IMAGE else "north",) * count,
         label_m=label_m,
         sigma_m=np.full(count, LABEL_SIGMA_M),
         image=np.full(count, image, dtype=np.int64),
