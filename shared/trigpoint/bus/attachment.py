@@ -8,14 +8,19 @@ number u32; its payload holds for each of them the lengths of attachment and pay
 """
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+
+import numpy as np
 
 from trigpoint.errors import InputError
 from trigpoint.events.envelope import EventIdentity
+from trigpoint.events.runs import EncodedRun, Integers
 
 LAYOUT_VERSION = 1
 BUNDLE_VERSION = 2
+BUNDLE_LIMIT = 4096  # messages a receiver unpacks; senders of ours stay far below
 _HEAD = struct.Struct("<BBHqq")
+_SEQUENCE_AT = 4  # bytes before sequence and stamp
 _BUNDLE = struct.Struct("<BI")
 _LENGTHS = struct.Struct("<II")
 
@@ -64,16 +69,50 @@ def is_bundle(attachment: bytes) -> bool:
     return len(attachment) == _BUNDLE.size and attachment[0] == BUNDLE_VERSION
 
 
-def decode_bundle(payload: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Attachment and payload of each message of a bundle. Raises InputError where the bundle ends inside of one."""
-    offset, end = 0, len(payload)
+def decode_bundle(payload: bytes) -> tuple[list[bytes], list[bytes]]:
+    """Attachments and payloads of a bundle's messages. Raises InputError where the bundle ends inside of one."""
+    attachments: list[bytes] = []
+    payloads: list[bytes] = []
+    offset, end, size, unpack = 0, len(payload), _LENGTHS.size, _LENGTHS.unpack_from
     while offset < end:
-        if end - offset < _LENGTHS.size:
+        if end - offset < size:
             raise InputError(f"bundle of {end} bytes ends inside the lengths at {offset}")
-        attachment_length, payload_length = _LENGTHS.unpack_from(payload, offset)
-        payload_at = offset + _LENGTHS.size + attachment_length
+        attachment_length, payload_length = unpack(payload, offset)
+        payload_at = offset + size + attachment_length
         following = payload_at + payload_length
         if following > end:
             raise InputError(f"bundle of {end} bytes ends inside the message at {offset}, which reaches to {following}")
-        yield payload[offset + _LENGTHS.size : payload_at], payload[payload_at:following]
+        attachments.append(payload[offset + size : payload_at])
+        payloads.append(payload[payload_at:following])
         offset = following
+    return attachments, payloads
+
+
+def attachment_columns(attachments: Sequence[bytes]) -> tuple[EventIdentity, int, Integers, Integers] | None:
+    """Source and boot (in an identity of the first message), schema version, sequences (n,) and stamps in ns (n,) of
+    attachments that differ in nothing else; None if they do, or are not ours.
+    """
+    joined, length = b"".join(attachments), len(attachments[0])
+    if length < _HEAD.size or any(len(attachment) != length for attachment in attachments):
+        return None
+    table = np.frombuffer(joined, dtype=np.uint8).reshape(len(attachments), length)
+    shared = np.concatenate([table[:, :_SEQUENCE_AT], table[:, _HEAD.size :]], axis=1)
+    if (shared != shared[0]).any():
+        return None
+    try:
+        identity, _, schema_version = decode_attachment(attachments[0])
+    except InputError:
+        return None
+    numbers = np.ascontiguousarray(table[:, _SEQUENCE_AT : _HEAD.size]).view("<i8").astype(np.int64)
+    return identity, schema_version, numbers[:, 0], numbers[:, 1]
+
+
+def run_attachments(run: EncodedRun, *, schema_version: int) -> list[bytes]:
+    """The attachment of each message of a run."""
+    first = EventIdentity(run.source, run.boot_id, 0)
+    template = np.frombuffer(encode_attachment(first, stamp_ns=0, schema_version=schema_version), dtype=np.uint8)
+    table = np.tile(template, (len(run), 1))
+    numbers = np.stack([run.sequences, run.stamps_ns], axis=1).astype("<i8")
+    table[:, _SEQUENCE_AT : _HEAD.size] = numbers.view(np.uint8)
+    packed, length = table.tobytes(), len(template)
+    return [packed[start : start + length] for start in range(0, len(packed), length)]

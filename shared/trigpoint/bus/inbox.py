@@ -7,15 +7,19 @@ from typing import Generic, TypeVar
 ItemT = TypeVar("ItemT")
 
 INBOX_CAPACITY = 65_536  # messages; at 100 B each some 20 MB, half a second of the fastest vehicle replay
+INBOX_BYTES = 256 * 1024 * 1024  # of payload; what counts where messages are large, as point clouds are
 
 
 class Inbox(Generic[ItemT]):
-    """Items in order of arrival, of at most `capacity` messages; the newest are dropped, and counted, when full."""
+    """Items in order of arrival, until they are `capacity` messages or `capacity_bytes`; the newest are dropped, and
+    counted, when full.
+    """
 
-    def __init__(self, capacity: int = INBOX_CAPACITY) -> None:
-        self._capacity = capacity
-        self._items: queue.SimpleQueue[tuple[ItemT, int] | None] = queue.SimpleQueue()
+    def __init__(self, capacity: int = INBOX_CAPACITY, *, capacity_bytes: int = INBOX_BYTES) -> None:
+        self._capacity, self._capacity_bytes = capacity, capacity_bytes
+        self._items: queue.SimpleQueue[tuple[ItemT, int, int] | None] = queue.SimpleQueue()
         self._held = 0  # messages
+        self._held_bytes = 0
         self._lost = 0
         self._lock = threading.Lock()
         self._closed = threading.Event()
@@ -25,14 +29,20 @@ class Inbox(Generic[ItemT]):
         """How many messages were dropped because the inbox was full."""
         return self._lost
 
-    def offer(self, item: ItemT, *, count: int = 1) -> None:
+    @property
+    def held(self) -> int:
+        """How many messages wait."""
+        return self._held
+
+    def offer(self, item: ItemT, *, count: int = 1, size_bytes: int = 0) -> None:
         """The item of `count` messages queued, or lost if the inbox is full; without effect once closed."""
         if self._closed.is_set():
             return
         with self._lock:
-            if self._held < self._capacity:
+            if self._held < self._capacity and self._held_bytes < self._capacity_bytes:
                 self._held += count
-                self._items.put((item, count))
+                self._held_bytes += size_bytes
+                self._items.put((item, count, size_bytes))
             else:
                 self._lost += count
 
@@ -46,9 +56,10 @@ class Inbox(Generic[ItemT]):
             return None
         if taken is None or self._closed.is_set():
             return None
-        item, count = taken
+        item, count, size_bytes = taken
         with self._lock:
             self._held -= count
+            self._held_bytes -= size_bytes
         return item
 
     def close(self) -> None:

@@ -5,10 +5,12 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Self
 
+from trigpoint.bus.arrivals import run_of_messages
 from trigpoint.bus.inbox import INBOX_CAPACITY, Inbox
 from trigpoint.bus.key_expressions import checked_expression, checked_key, key_matches
-from trigpoint.bus.ports import BusMessage
+from trigpoint.bus.ports import BusMessage, BusRun
 from trigpoint.errors import ServiceError
+from trigpoint.events.envelope import EventIdentity
 
 
 class MemorySubscription:
@@ -24,17 +26,27 @@ class MemorySubscription:
         """How many messages were dropped because the queue was full."""
         return self._inbox.lost
 
+    @property
+    def waiting(self) -> int:
+        """How many messages wait to be received."""
+        return self._inbox.held
+
     def matches(self, key: str) -> bool:
         """Whether messages on this key belong here."""
         return key_matches(self._expression, key)
 
     def offer(self, message: BusMessage) -> None:
         """The message queued, or counted as lost."""
-        self._inbox.offer(message)
+        self._inbox.offer(message, size_bytes=len(message.payload))
 
     def receive(self, timeout_s: float) -> BusMessage | None:
         """The next message, or None if none came within `timeout_s` or the subscription is closed."""
         return self._inbox.take(timeout_s)
+
+    def receive_run(self, timeout_s: float) -> BusRun | None:
+        """The next message as a run of one: in memory each comes by itself."""
+        message = self._inbox.take(timeout_s)
+        return None if message is None else run_of_messages([message])
 
     def close(self) -> None:
         """No more messages; ones not yet received are dropped."""
@@ -42,13 +54,40 @@ class MemorySubscription:
         self._inbox.close()
 
 
+class MemoryClaim:
+    """A claimed key; made by MemoryBus.claim."""
+
+    def __init__(self, key: str, exchange: "MemoryExchange") -> None:
+        self.key = key
+        self._exchange = exchange
+
+    def release(self) -> None:
+        """The key no longer claimed."""
+        self._exchange.release(self)
+
+
 class MemoryExchange:
-    """What the sessions of one bus share: who listens to what."""
+    """What the sessions of one bus share: who listens to what, and who claims what."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._joined = threading.Condition(self._lock)
         self._subscriptions: tuple[MemorySubscription, ...] = ()
+        self._claims: tuple[MemoryClaim, ...] = ()
+
+    def hold(self, claim: MemoryClaim) -> None:
+        """From now on the claim is seen."""
+        with self._lock:
+            self._claims = (*self._claims, claim)
+
+    def release(self, claim: MemoryClaim) -> None:
+        """The claim is seen no more; again: no effect."""
+        with self._lock:
+            self._claims = tuple(other for other in self._claims if other is not claim)
+
+    def claimed(self, expression: str) -> tuple[str, ...]:
+        """The claimed keys an expression matches, sorted."""
+        return tuple(sorted({claim.key for claim in self._claims if key_matches(expression, claim.key)}))
 
     def join(self, subscription: MemorySubscription) -> None:
         """From now on the subscription hears what matches it."""
@@ -78,6 +117,7 @@ class MemoryBus:
         self._exchange = exchange if exchange is not None else MemoryExchange()
         self._capacity = capacity
         self._own: list[MemorySubscription] = []
+        self._claims: list[MemoryClaim] = []
         self._closed = False
 
     def publish(self, message: BusMessage) -> None:
@@ -90,6 +130,36 @@ class MemoryBus:
         """Each message queued with every subscription that matches it."""
         for message in messages:
             self.publish(message)
+
+    def publish_run(self, run: BusRun) -> None:
+        """Each message of the run queued with every subscription that matches its key."""
+        rows = run.run
+        for sequence, stamp_ns, payload in zip(
+            rows.sequences.tolist(), rows.stamps_ns.tolist(), rows.payloads, strict=True
+        ):
+            self.publish(
+                BusMessage(
+                    key=run.key,
+                    schema_name=rows.schemas[0],
+                    payload=payload,
+                    identity=EventIdentity(rows.source, rows.boot_id, sequence),
+                    stamp_ns=stamp_ns,
+                    schema_version=run.schema_version,
+                )
+            )
+
+    def claim(self, key: str) -> MemoryClaim:
+        """The key claimed on the exchange."""
+        self._require_open()
+        claim = MemoryClaim(checked_key(key), self._exchange)
+        self._claims.append(claim)
+        self._exchange.hold(claim)
+        return claim
+
+    def claimed(self, key_expression: str) -> tuple[str, ...]:
+        """The exchange's claimed keys that match."""
+        self._require_open()
+        return self._exchange.claimed(checked_expression(key_expression))
 
     def subscribe(self, key_expression: str) -> MemorySubscription:
         """A subscription to all keys the expression matches."""
@@ -110,11 +180,14 @@ class MemoryBus:
         return self._exchange.await_listener(checked_key(key), timeout_s)
 
     def close(self) -> None:
-        """The session and its subscriptions ended."""
+        """The session, its subscriptions and claims ended."""
         self._closed = True
         for subscription in self._own:
             subscription.close()
         self._own.clear()
+        for claim in self._claims:
+            claim.release()
+        self._claims.clear()
 
     def _require_open(self) -> None:
         if self._closed:

@@ -6,6 +6,7 @@ from types import TracebackType
 from typing import Protocol, Self
 
 from trigpoint.events.envelope import EventIdentity
+from trigpoint.events.runs import EncodedRun
 
 UNIDENTIFIED = EventIdentity("", "", -1)
 """Identity of a message that came without a readable attachment: its sender does not speak trigpoint."""
@@ -25,6 +26,22 @@ class BusMessage:
     schema_version: int = 1
 
 
+@dataclass(frozen=True, slots=True)
+class BusRun:
+    """Messages of one key, schema, source and boot that came or go together."""
+
+    key: str
+    schema_version: int
+    run: EncodedRun
+
+
+class Claim(Protocol):
+    """A key held under one's name for as long as the session lives, for all to see; nothing forbids a second one."""
+
+    def release(self) -> None:
+        """The key no longer claimed; again: no effect."""
+
+
 class Subscription(Protocol):
     """Messages that arrived for one key expression, in order of arrival."""
 
@@ -32,8 +49,15 @@ class Subscription(Protocol):
     def lost(self) -> int:
         """How many messages arrived and were dropped because the queue was full; never reset."""
 
+    @property
+    def waiting(self) -> int:
+        """How many messages wait to be received."""
+
     def receive(self, timeout_s: float) -> BusMessage | None:
         """The next message, or None if none came within `timeout_s` or the subscription is closed."""
+
+    def receive_run(self, timeout_s: float) -> BusRun | None:
+        """The next messages that came together, or None as `receive`; a message is received once, by either."""
 
     def close(self) -> None:
         """No more messages; ones not yet received are dropped."""
@@ -54,6 +78,9 @@ class Bus(Protocol):
         For senders whose messages are worth more together than at once. Raises as `publish` does.
         """
 
+    def publish_run(self, run: BusRun) -> None:
+        """A run's messages as by `publish_all`. Raises as `publish` does."""
+
     def subscribe(self, key_expression: str) -> Subscription:
         """A subscription to all keys the expression matches (`*` one chunk, `**` any number).
 
@@ -66,8 +93,19 @@ class Bus(Protocol):
     def await_listener(self, key: str, timeout_s: float) -> bool:
         """The same as soon as it is so, or False after `timeout_s`."""
 
+    def claim(self, key: str) -> Claim:
+        """The key claimed until released or the session ends, however it ends.
+
+        Raises InputError for a key that may not be published, ServiceError on a closed bus.
+        """
+
+    def claimed(self, key_expression: str) -> tuple[str, ...]:
+        """The claimed keys an expression matches, one's own included, sorted, as far as word of them has come here:
+        others' claims take a moment. Raises as `subscribe` does.
+        """
+
     def close(self) -> None:
-        """The session and its subscriptions ended; again: no effect."""
+        """The session, its subscriptions and claims ended; again: no effect."""
 
     def __enter__(self) -> Self: ...
 

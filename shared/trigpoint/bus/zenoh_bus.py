@@ -136,6 +136,7 @@ class ZenohBus:
         self._lock = threading.Lock()
         self._publishers: dict[tuple[str, str], zenoh.Publisher] = {}
         self._subscriptions: list[ZenohSubscription] = []
+        self._claims: list[ZenohClaim] = []
         try:
             self._session = zenoh.open(_config(settings))
         except zenoh.ZError as error:
@@ -200,9 +201,11 @@ class ZenohBus:
         """The key claimed by a liveliness token: gone when the session's links are."""
         self._require_open()
         try:
-            return ZenohClaim(self._session.liveliness().declare_token(checked_key(key)))
+            claim = ZenohClaim(self._session.liveliness().declare_token(checked_key(key)))
         except zenoh.ZError as error:
             raise ServiceError(f"{key} could not be claimed: {error}") from error
+        self._claims.append(claim)  # a token that nobody refers to any more is undeclared
+        return claim
 
     def claimed(self, key_expression: str) -> tuple[str, ...]:
         """The keys with a liveliness token that match, of every session reachable now."""
@@ -231,7 +234,10 @@ class ZenohBus:
         """The session, its publishers and subscriptions ended: an open one would hang the interpreter's exit."""
         for subscription in self._subscriptions:
             subscription.close()
+        for claim in self._claims:
+            claim.release()
         self._subscriptions.clear()
+        self._claims.clear()
         self._publishers.clear()
         if not self._session.is_closed():
             self._session.close()  # type: ignore[no-untyped-call]

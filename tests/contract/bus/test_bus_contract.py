@@ -8,6 +8,7 @@ from contextlib import ExitStack
 
 import pytest
 
+from trigpoint.bus.arrivals import run_of_messages
 from trigpoint.bus.memory_bus import MemoryBus, MemoryExchange
 from trigpoint.bus.ports import UNIDENTIFIED, Bus, BusMessage, Subscription
 from trigpoint.bus.zenoh_bus import ZenohBus, ZenohSettings
@@ -63,6 +64,37 @@ def until_lost(subscription: Subscription, count: int) -> None:
         time.sleep(0.001)
 
 
+def until_waiting(subscription: Subscription, count: int) -> None:
+    deadline = time.monotonic() + SOON_S
+    while subscription.waiting < count and time.monotonic() < deadline:
+        time.sleep(0.001)
+
+
+def until_claimed(bus: Bus, expression: str, keys: tuple[str, ...]) -> None:
+    """A claim or its end takes a moment to travel."""
+    deadline = time.monotonic() + SOON_S
+    while bus.claimed(expression) != keys and time.monotonic() < deadline:
+        time.sleep(0.001)
+
+
+def received_in_runs(subscription: Subscription, count: int) -> list[BusMessage]:
+    received: list[BusMessage] = []
+    while len(received) < count and (found := subscription.receive_run(SOON_S)) is not None:
+        rows = found.run
+        for sequence, stamp_ns, payload in zip(rows.sequences, rows.stamps_ns, rows.payloads, strict=True):
+            received.append(
+                BusMessage(
+                    key=found.key,
+                    schema_name=rows.schemas[int(rows.schema_of_row[0])],
+                    payload=payload,
+                    identity=EventIdentity(rows.source, rows.boot_id, int(sequence)),
+                    stamp_ns=int(stamp_ns),
+                    schema_version=found.schema_version,
+                )
+            )
+    return received
+
+
 def all_received(subscription: Subscription, count: int) -> list[BusMessage]:
     received = [subscription.receive(SOON_S) for _ in range(count)]
     return [item for item in received if item is not None]
@@ -95,6 +127,74 @@ def test_messages_published_together_arrive_one_by_one_each_key_in_order(pair: t
     received = all_received(subscription, len(sent))
     assert [item for item in received if item.key == "t/a"] == sent[0::2]
     assert [item for item in received if item.key == "t/b"] == sent[1::2]
+
+
+def test_what_is_published_together_can_be_received_as_runs(pair: tuple[Bus, Bus]) -> None:
+    publisher, listener = pair
+    subscription = listener.subscribe("t/*")
+    until_heard(publisher, "t/a")
+    sent = [message("t/a", sequence) for sequence in range(SMALL_INBOX)]
+    publisher.publish_all(sent)
+    assert received_in_runs(subscription, len(sent)) == sent
+
+
+def test_a_run_arrives_as_the_messages_it_holds(pair: tuple[Bus, Bus]) -> None:
+    publisher, listener = pair
+    subscription = listener.subscribe("t/*")
+    until_heard(publisher, "t/a")
+    sent = [message("t/a", sequence) for sequence in range(SMALL_INBOX)]
+    publisher.publish_run(run_of_messages(sent))
+    assert all_received(subscription, len(sent)) == sent
+
+
+def test_the_rest_of_a_bundle_can_be_received_as_a_run(pair: tuple[Bus, Bus]) -> None:
+    publisher, listener = pair
+    subscription = listener.subscribe("t/*")
+    until_heard(publisher, "t/a")
+    sent = [message("t/a", sequence) for sequence in range(SMALL_INBOX)]
+    publisher.publish_all(sent)
+    first = all_received(subscription, 1)
+    assert first + received_in_runs(subscription, len(sent) - 1) == sent
+
+
+def test_what_waits_is_counted(pair: tuple[Bus, Bus]) -> None:
+    publisher, listener = pair
+    subscription = listener.subscribe("t/a")
+    until_heard(publisher, "t/a")
+    publisher.publish_all([message("t/a", sequence) for sequence in range(3)])
+    until_waiting(subscription, 3)
+    assert subscription.waiting == 3
+
+
+def test_a_claim_is_seen_by_both_sessions_until_it_is_released(pair: tuple[Bus, Bus]) -> None:
+    claiming, looking = pair
+    claim = claiming.claim("t/live/a/1")
+    until_claimed(looking, "t/live/*/*", ("t/live/a/1",))
+    assert claiming.claimed("t/live/a/*") == ("t/live/a/1",)
+    claim.release()
+    until_claimed(looking, "t/live/*/*", ())
+    assert looking.claimed("t/live/*/*") == ()
+
+
+def test_two_claims_of_a_name_are_both_seen(pair: tuple[Bus, Bus]) -> None:
+    pair[0].claim("t/live/a/2")
+    pair[1].claim("t/live/a/1")
+    both = ("t/live/a/1", "t/live/a/2")
+    until_claimed(pair[0], "t/live/a/*", both)
+    assert pair[0].claimed("t/live/a/*") == both
+
+
+def test_closing_a_bus_releases_its_claims(pair: tuple[Bus, Bus]) -> None:
+    pair[0].claim("t/live/a/1")
+    until_claimed(pair[1], "t/live/a/*", ("t/live/a/1",))
+    pair[0].close()
+    until_claimed(pair[1], "t/live/a/*", ())
+    assert pair[1].claimed("t/live/a/*") == ()
+
+
+def test_a_claim_of_a_key_that_cannot_be_published_is_refused(pair: tuple[Bus, Bus]) -> None:
+    with pytest.raises(InputError, match="key"):
+        pair[0].claim("t/*")
 
 
 def test_what_is_lost_together_is_counted_one_by_one(pair: tuple[Bus, Bus]) -> None:

@@ -24,3 +24,19 @@ def test_a_closed_inbox_takes_nothing_in_and_gives_nothing_out() -> None:
     inbox.close()
     inbox.offer("late")
     assert (inbox.take(0.0), inbox.lost) == (None, 0)
+
+
+def test_an_inbox_is_full_of_bytes_as_well_as_of_messages() -> None:
+    inbox: Inbox[str] = Inbox(100, capacity_bytes=1000)
+    inbox.offer("first", size_bytes=999)
+    inbox.offer("second", size_bytes=999)
+    inbox.offer("third", size_bytes=1)
+    assert (inbox.lost, inbox.held) == (1, 2)
+
+
+def test_bytes_taken_out_make_room_for_others() -> None:
+    inbox: Inbox[str] = Inbox(100, capacity_bytes=1000)
+    inbox.offer("first", size_bytes=1000)
+    inbox.take(0.0)
+    inbox.offer("second", size_bytes=1000)
+    assert (inbox.lost, inbox.take(0.0)) == (0, "second")
