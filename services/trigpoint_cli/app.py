@@ -21,6 +21,7 @@ COMMANDS = {
     "config": ("trigpoint_cli.config", "Show or check the configuration of a deployment."),
     "serve": ("trigpoint_cli.serve", "Run one service as a process of its own."),
     "router": ("trigpoint_cli.router", "Run the Zenoh router of a fleet."),
+    "up": ("trigpoint_cli.up", "Run every service of one machine, each a process of its own, kept running."),
     "convert": ("trigpoint_cli.convert", "Turn recorded data into vehicles' logs."),
     "ingest": ("trigpoint_cli.ingest", "Take vehicles' logs into a data directory."),
     "anchors": ("trigpoint_cli.anchors", "Take anchors labelled in aerial images into a data directory."),

@@ -6,7 +6,7 @@ import click
 
 from trigpoint.configuration.showing import shown_values, toml_lines
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering
-from trigpoint_cli.settings import configuration_options, configured_settings
+from trigpoint_cli.settings import configuration_options, configured_settings, secrets_of
 
 
 @click.group("config", help="Show or check the configuration of a deployment.")
@@ -38,5 +38,6 @@ def show(config: Path | None, flags: tuple[str, ...], *, screen: Screen) -> Answ
 def check(config: Path | None, flags: tuple[str, ...], *, screen: Screen) -> Answer:
     """Say whether the services would start with this configuration; everything that is wrong is named."""
     found = configured_settings(config, flags)
+    secrets_of(found.settings)  # its files can be read
     given = len(found.given)
     return Answer({"valid": True, "given": given}, (f"the configuration is valid; {given} values are set",))
