@@ -154,7 +154,7 @@ def _created(connection: Connection) -> None:
     for reference in schema.required_references():
         insert_reference(connection, reference)
     tables.metadata.create_all(connection)
-    for view in schema.VIEWS:
+    for view in tables.CURRENT_VIEWS.values():
         connection.execute(text(view))
     for feature_layer in schema.FEATURE_LAYERS:
         _register_features(connection, feature_layer)

@@ -74,11 +74,6 @@ ATTRIBUTE_LAYERS = (
     AttributeLayer("image_offsets", "Offsets of the aerial images, in every map version"),
     AttributeLayer("log_checkpoints", "How far the event log has been taken in"),
 )
-VIEWS = tuple(
-    f"CREATE VIEW current_{table} AS SELECT * FROM {table} "
-    "WHERE map_version = (SELECT max(map_version) FROM map_versions)"
-    for table in ("trajectories", "anchors")
-)
 
 
 def spatial_reference_of(crs: str) -> SpatialReference:

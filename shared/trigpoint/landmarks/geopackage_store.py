@@ -4,6 +4,7 @@ import sqlite3
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import cast
 
 from sqlalchemy import Connection, Table, delete, insert, select, text
 
@@ -19,6 +20,7 @@ from trigpoint.landmarks.geopackage_file import (
     opened,
     transaction,
 )
+from trigpoint.landmarks.geopackage_geometry import decoded_point, encoded_point
 from trigpoint.landmarks.geopackage_query import (
     LANDMARK_TABLES,
     WIDEST_INDEXED_DEG,
@@ -30,7 +32,7 @@ from trigpoint.landmarks.geopackage_query import (
     held_extent,
     landmark_sql,
 )
-from trigpoint.landmarks.geopackage_record import COLUMNS, INSERT_SQL, landmark_of, record_of
+from trigpoint.landmarks.landmark_record import COLUMNS, LandmarkRecord, landmark_of, record_of
 from trigpoint.landmarks.model import Checkpoint, Landmark, LandmarkChanges, MapChange, MapRow, MapVersion
 from trigpoint.landmarks.queries import (
     DegreeBox,
@@ -42,6 +44,7 @@ from trigpoint.landmarks.queries import (
     require_next_version,
 )
 
+INSERT_SQL = f"INSERT INTO landmarks ({', '.join(COLUMNS)}) VALUES ({', '.join('?' * len(COLUMNS))})"
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
@@ -56,15 +59,27 @@ class GeoPackageStore:
 
     def apply(self, change: MapChange, checkpoint: Checkpoint) -> None:
         """One map version and its checkpoint in one transaction."""
+        self.apply_all((change,), checkpoint)
+
+    def apply_all(self, changes: Sequence[MapChange], checkpoint: Checkpoint) -> None:
+        """Consecutive map versions and their checkpoint in one transaction."""
         with database_errors(self._path), transaction(self._connection):
             versions = self._versions()
-            require_next_version(change.version, versions)
-            if not versions:
-                self._adopt_crs(change.version.crs)
-            self._write(change)
+            for change in changes:
+                require_next_version(change.version, versions)
+                if not versions:
+                    self._adopt_crs(change.version.crs)
+                self._write(change)
+                versions = (change.version,)
             self._write_checkpoint(checkpoint)
-            self._date_layers(change.version.solved_ns)
+            self._date_layers(changes[-1].version.solved_ns)
         self._extent = None
+
+    def defer_indexes(self) -> None:
+        """Nothing: an index takes in the rows of a version together, which is fast enough."""
+
+    def restore_indexes(self) -> None:
+        """Nothing: none was put off."""
 
     def landmarks(self, query: LandmarkQuery) -> tuple[Landmark, ...]:
         """The landmarks that meet a query."""
@@ -139,7 +154,7 @@ class GeoPackageStore:
             as_of=older,
             limited=query.limit is not None and box is None,
         )
-        return map(landmark_of, self._driver.execute(landmark_sql(source, shape), bound))
+        return map(_landmark, self._driver.execute(landmark_sql(source, shape), bound))
 
     def _window(self, box: DegreeBox) -> dict[str, float] | None:
         """The grid window to look a box up in; None where the index cannot serve and columns must."""
@@ -172,7 +187,10 @@ class GeoPackageStore:
         self._insert(tables.image_offsets, [records.plain_record(row) for row in change.image_offsets])
 
     def _open_landmarks(self, change: MapChange, srs_id: int) -> None:
-        values = (record_of(landmark, srs_id=srs_id) for landmark in change.opened)
+        values = (
+            record_of(landmark, encoded_point(landmark.easting_m, landmark.northing_m, srs_id=srs_id))
+            for landmark in change.opened
+        )
         try:
             with indexed_at_once(self._driver, "landmarks"):
                 self._driver.executemany(INSERT_SQL, values)
@@ -214,3 +232,8 @@ class GeoPackageStore:
                 "UPDATE gpkg_contents SET min_x = ?, min_y = ?, max_x = ?, max_y = ? WHERE table_name = ?",
                 (*box, layer.name),
             )
+
+
+def _landmark(record: tuple[bytes, *tuple[object, ...]]) -> Landmark:
+    easting_m, northing_m = decoded_point(record[0])
+    return landmark_of(cast(LandmarkRecord, record), easting_m=easting_m, northing_m=northing_m)

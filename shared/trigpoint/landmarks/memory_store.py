@@ -1,6 +1,6 @@
 """The landmark store in memory: for tests, and for maps nobody keeps."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from trigpoint.errors import InputError
@@ -37,12 +37,24 @@ class MemoryStore:
 
     def apply(self, change: MapChange, checkpoint: Checkpoint) -> None:
         """One map version and its checkpoint; nothing if it is refused."""
-        require_next_version(change.version, self._versions)
-        valid, ended = self._after(change)
-        self._valid, self._ended = valid, self._ended + ended
-        self._versions += (change.version,)
-        self._others += change.trajectories + change.anchors + change.image_offsets
+        self.apply_all((change,), checkpoint)
+
+    def apply_all(self, changes: Sequence[MapChange], checkpoint: Checkpoint) -> None:
+        """Consecutive map versions and their checkpoint; nothing if one is refused."""
+        before = (self._valid, self._ended, self._versions, self._others)
+        try:
+            for change in changes:
+                self._take(change)
+        except InputError:
+            self._valid, self._ended, self._versions, self._others = before
+            raise
         self._checkpoint = checkpoint
+
+    def defer_indexes(self) -> None:
+        """Nothing: there are none."""
+
+    def restore_indexes(self) -> None:
+        """Nothing: there are none."""
 
     def landmarks(self, query: LandmarkQuery) -> tuple[Landmark, ...]:
         """The landmarks that meet a query."""
@@ -73,6 +85,13 @@ class MemoryStore:
 
     def close(self) -> None:
         """Nothing is held open."""
+
+    def _take(self, change: MapChange) -> None:
+        require_next_version(change.version, self._versions)
+        valid, ended = self._after(change)
+        self._valid, self._ended = valid, self._ended + ended
+        self._versions += (change.version,)
+        self._others += change.trajectories + change.anchors + change.image_offsets
 
     def _after(self, change: MapChange) -> tuple[dict[str, Landmark], tuple[Landmark, ...]]:
         map_version = change.version.map_version

@@ -16,10 +16,12 @@ Floats = NDArray[np.float64]
 class MapVersion:
     """One solved map version: how it was solved, in which frame, and where its MapSolved event stands in the log.
 
+    `base_version` 0: it was solved whole; else its events said only what differs from that version.
     `inputs_json` is a list of [stream, count]: the log was solved up to there. `solved_ns` is the event's stamp.
     """
 
     map_version: int
+    base_version: int
     method: str
     settings_json: str
     inputs_json: str

@@ -1,6 +1,6 @@
 """What a landmark store can do, whatever keeps it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Protocol
 
 from trigpoint.landmarks.model import Checkpoint, Landmark, LandmarkChanges, MapChange, MapRow, MapVersion
@@ -17,6 +17,18 @@ class LandmarkStore(Protocol):
         before, for an id closed that is not valid and for one opened that still is; ServiceError if the
         database cannot be written.
         """
+
+    def apply_all(self, changes: Sequence[MapChange], checkpoint: Checkpoint) -> None:
+        """Consecutive map versions, at least one, and the checkpoint after the last: all or nothing.
+
+        The rows are the same as if each were applied by itself. Raises as `apply`.
+        """
+
+    def defer_indexes(self) -> None:
+        """From now on many versions are applied and few questions asked: indexes may be put off, answers slow."""
+
+    def restore_indexes(self) -> None:
+        """Every index is there."""
 
     def landmarks(self, query: LandmarkQuery) -> tuple[Landmark, ...]:
         """The landmarks that meet a query; none while no version is there. Raises InputError for an unknown version."""

@@ -2,16 +2,21 @@
 
 from typing import Any
 
-from sqlalchemy import REAL, BigInteger, Boolean, Column, Integer, MetaData, Table, Text, UniqueConstraint
+from geoalchemy2 import Geometry, WKBElement
+from sqlalchemy import REAL, BigInteger, Boolean, Column, Double, Integer, MetaData, Table, Text, UniqueConstraint
 from sqlalchemy.engine import Dialect
 from sqlalchemy.types import LargeBinary, TypeDecorator, TypeEngine, UserDefinedType
 
+from trigpoint.landmarks import postgis_geometry
 from trigpoint.landmarks.geopackage_geometry import Coordinates, decoded, encoded_line, encoded_point
 
 metadata = MetaData()
 
-# Columns are TEXT, INTEGER and REAL: GDAL skips VARCHAR columns of a GeoPackage and reads FLOAT as 32 bits.
+# A GeoPackage has TEXT, INTEGER and REAL: GDAL skips VARCHAR columns there and reads FLOAT as 32 bits. All numbers
+# have 64 bits in every database, REAL in a GeoPackage among them; PostgreSQL's REAL would have 32.
 WholeNumber = BigInteger().with_variant(Integer, "sqlite")
+RealNumber: TypeEngine[float] = Double().with_variant(REAL, "sqlite")
+UNKNOWN_SRID = -1  # any, until the map's CRS is known
 
 
 class GeometryColumn(UserDefinedType[bytes]):
@@ -28,10 +33,8 @@ class GeometryColumn(UserDefinedType[bytes]):
 
 
 class LandmarkGeometry(TypeDecorator[tuple[int, Coordinates]]):
-    """A point ("POINT") or line ("LINESTRING") as (srs id, coordinates): GeoPackage bytes on SQLite.
-
-    A server database gets its own branch in `load_dialect_impl`; the tables below stay as they are.
-    """
+    """A point ("POINT") or line ("LINESTRING") as (srs id, coordinates): GeoPackage bytes on SQLite, a PostGIS geometry
+    on PostgreSQL."""
 
     impl = LargeBinary
     cache_ok = True
@@ -42,22 +45,30 @@ class LandmarkGeometry(TypeDecorator[tuple[int, Coordinates]]):
 
     def load_dialect_impl(self, dialect: Dialect) -> TypeEngine[Any]:
         """The column type of a database."""
-        if dialect.name != "sqlite":
-            raise NotImplementedError(f"geometry on {dialect.name}: only sqlite is there")
+        if dialect.name == "postgresql":
+            return Geometry(self.geometry_name, srid=UNKNOWN_SRID, spatial_index=False)
         return dialect.type_descriptor(GeometryColumn(self.geometry_name))
 
-    def process_bind_param(self, value: tuple[int, Coordinates] | None, dialect: Dialect) -> bytes | None:
-        """GeoPackage bytes."""
+    def process_bind_param(self, value: tuple[int, Coordinates] | None, dialect: Dialect) -> bytes | str | None:
+        """GeoPackage bytes, or what PostGIS reads as a geometry."""
         if value is None:
             return None
         srs_id, points = value
+        if dialect.name == "postgresql":
+            return postgis_geometry.encoded(points, srs_id=srs_id).hex()
         if self.geometry_name == "POINT":
             return encoded_point(*points[0], srs_id=srs_id)
         return encoded_line(points, srs_id=srs_id)
 
-    def process_result_value(self, value: bytes | None, dialect: Dialect) -> tuple[int, Coordinates] | None:
+    def process_result_value(
+        self, value: bytes | WKBElement | None, dialect: Dialect
+    ) -> tuple[int, Coordinates] | None:
         """The srs id and the coordinates."""
-        return None if value is None else (int.from_bytes(value[4:8], "little", signed=True), decoded(value))
+        if value is None:
+            return None
+        if isinstance(value, WKBElement):
+            return postgis_geometry.decoded(bytes.fromhex(value.desc))
+        return int.from_bytes(value[4:8], "little", signed=True), decoded(value)
 
 
 def _whole(name: str, *, nullable: bool = False) -> Column[int]:
@@ -65,7 +76,7 @@ def _whole(name: str, *, nullable: bool = False) -> Column[int]:
 
 
 def _real(name: str, *, nullable: bool = False) -> Column[float]:
-    return Column(name, REAL, nullable=nullable)
+    return Column(name, RealNumber, nullable=nullable)
 
 
 def _text(name: str) -> Column[str]:
@@ -73,7 +84,7 @@ def _text(name: str) -> Column[str]:
 
 
 def _feature_id() -> Column[int]:
-    return Column("fid", Integer, primary_key=True)
+    return Column("fid", WholeNumber, primary_key=True)
 
 
 def _covariance() -> tuple[Column[float], ...]:
@@ -120,7 +131,7 @@ trajectories = Table(
     _whole("pose_count"),
     _real("length_m"),
     _text("calibration_json"),
-    UniqueConstraint("map_version", "vehicle", "boot_id"),
+    UniqueConstraint("vehicle", "boot_id", "map_version"),
 )
 
 anchors = Table(
@@ -132,7 +143,7 @@ anchors = Table(
     *(_text(column) for column in ("anchor", "image", "kind", "signature", "landmark", "reason")),
     *(_real(column, nullable=True) for column in ("sigma_m", "residual_x_m", "residual_y_m", "residual_m")),
     *(_real(column, nullable=True) for column in ("lat_deg", "lon_deg")),
-    UniqueConstraint("map_version", "anchor"),
+    UniqueConstraint("anchor", "image", "map_version"),
 )
 
 image_offsets = Table(
@@ -144,13 +155,14 @@ image_offsets = Table(
     _real("offset_x_m"),
     _real("offset_y_m"),
     *_covariance(),
-    UniqueConstraint("map_version", "image"),
+    UniqueConstraint("image", "map_version"),
 )
 
 map_versions = Table(
     "map_versions",
     metadata,
-    Column("map_version", Integer, primary_key=True),
+    Column("map_version", WholeNumber, primary_key=True, autoincrement=False),
+    _whole("base_version"),
     *(_text(column) for column in ("method", "settings_json", "inputs_json")),
     _whole("landmark_count"),
     _whole("anchor_count"),
@@ -173,3 +185,19 @@ checkpoints = Table(
     _whole("next_number"),
     UniqueConstraint("stream"),
 )
+
+
+def _current(table: str, *key: str) -> str:
+    """The view of a table's newest rows: one of each key, none from before the newest version that is whole."""
+    same = " AND ".join(f"later.{column} = {table}.{column}" for column in key)
+    return (
+        f"CREATE VIEW current_{table} AS SELECT * FROM {table} "
+        "WHERE map_version >= (SELECT max(map_version) FROM map_versions WHERE base_version = 0) "
+        f"AND NOT EXISTS (SELECT 1 FROM {table} later WHERE {same} AND later.map_version > {table}.map_version)"
+    )
+
+
+CURRENT_VIEWS = {
+    "current_trajectories": _current("trajectories", "vehicle", "boot_id"),
+    "current_anchors": _current("anchors", "anchor", "image"),
+}

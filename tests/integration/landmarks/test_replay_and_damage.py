@@ -88,7 +88,7 @@ def test_a_replay_only_reads_the_database(log: MemoryLog, path: Path) -> None:
         ),
         (
             "UPDATE anchors SET residual_x_m = NULL",
-            ("anchors", "anchor-1 of version 1", "residual_x_m None instead of 0.3"),
+            ("anchors", "anchor-1 in tile-1 of version 1", "residual_x_m None instead of 0.3"),
         ),
         ("UPDATE image_offsets SET image = 'x'", ("image_offsets", "tile-1 of version 1", "missing in the database")),
         ("UPDATE map_versions SET method = 'loose'", ("map_versions", "1", "method 'loose' instead of 'anchored'")),

@@ -1,30 +1,28 @@
-"""A landmark as a record of a GeoPackage and back, field by field: there are many, and they are asked for often."""
+"""A landmark as a record of a database and back, field by field: there are many, and they are asked for often."""
 
 from operator import attrgetter
 
 from trigpoint.landmarks import tables
-from trigpoint.landmarks.geopackage_geometry import decoded_point, encoded_point
 from trigpoint.landmarks.model import Landmark
 from trigpoint.landmarks.records import json_of_names, names_from_json
 
-# In the order of the columns of `landmarks`, the feature id left out.
+# In the order of the columns of `landmarks`, the feature id left out; the first is the geometry.
 LandmarkRecord = tuple[
-    bytes, str, str, str, float, float, float, float, float, float, float, float, float, float,
+    object, str, str, str, float, float, float, float, float, float, float, float, float, float,
     int, str, int, int, int, str, str, int, int | None,
 ]  # fmt: skip
 
 COLUMNS = tuple(column.name for column in tables.landmarks.columns if column.name != "fid")
-INSERT_SQL = f"INSERT INTO landmarks ({', '.join(COLUMNS)}) VALUES ({', '.join('?' * len(COLUMNS))})"
 
 _BEFORE_VEHICLES = attrgetter(*COLUMNS[1 : COLUMNS.index("vehicles")])
 _BEFORE_ANCHORS = attrgetter(*COLUMNS[COLUMNS.index("vehicles") + 1 : COLUMNS.index("anchors")])
 _AFTER_ANCHORS = attrgetter(*COLUMNS[COLUMNS.index("anchors") + 1 :])
 
 
-def record_of(landmark: Landmark, *, srs_id: int) -> tuple[object, ...]:
-    """The values `INSERT_SQL` binds."""
+def record_of(landmark: Landmark, geometry: bytes) -> tuple[object, ...]:
+    """The values of `COLUMNS`, the geometry as the database keeps it."""
     return (
-        encoded_point(landmark.easting_m, landmark.northing_m, srs_id=srs_id),
+        geometry,
         *_BEFORE_VEHICLES(landmark),
         json_of_names(landmark.vehicles),
         *_BEFORE_ANCHORS(landmark),
@@ -33,9 +31,8 @@ def record_of(landmark: Landmark, *, srs_id: int) -> tuple[object, ...]:
     )
 
 
-def landmark_of(record: LandmarkRecord) -> Landmark:
-    """The landmark of a record."""
-    easting_m, northing_m = decoded_point(record[0])
+def landmark_of(record: LandmarkRecord, *, easting_m: float, northing_m: float) -> Landmark:
+    """The landmark of a record, its geometry read before."""
     return Landmark(
         landmark=record[1],
         kind=record[2],

@@ -1,0 +1,1 @@
+"""Real databases for tests and figures of the landmark map."""
