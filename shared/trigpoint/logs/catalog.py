@@ -168,6 +168,15 @@ class Catalog:
         )
         return {row[0]: ChannelKey(*row[1:]) for row in rows}
 
+    def boots(self, stream: str) -> list[tuple[str, str, int, int]]:
+        """Source, boot and closed time range of the chunks with events of that boot, in order of time."""
+        return self._rows(
+            "SELECT source, boot_id, MIN(start_ns), MAX(end_ns) FROM channel JOIN chunk USING (stream, first_number)"
+            " WHERE stream = ? AND instr(' ' || channel_ids || ' ', ' ' || id || ' ') > 0"
+            " GROUP BY source, boot_id ORDER BY 3, 1, 2",
+            (stream,),
+        )
+
     def next_number(self, stream: str) -> int:
         """One more than the highest number known of a stream."""
         rows = self._rows("SELECT number + count FROM chunk WHERE stream = ? ORDER BY number DESC LIMIT 1", (stream,))

@@ -20,7 +20,7 @@ from trigpoint.logs.catalog import NAME, Catalog, CatalogChunk, FileContents
 from trigpoint.logs.channels import ChannelKey, PackedRows, packed_rows
 from trigpoint.logs.chunks import FRAME, messages, parsed, unpacked
 from trigpoint.logs.log_files import bring_up_to_date, file_path, valid_stream
-from trigpoint.logs.ports import LoggedEvent
+from trigpoint.logs.ports import LoggedBoot, LoggedEvent
 from trigpoint.logs.stream_writer import Rotation, StreamWriter
 
 DEFAULT_ROTATION = Rotation()
@@ -179,6 +179,11 @@ class McapLog:
         """The number the next appended event will get; 0 for an unknown stream."""
         self._bring_up_to_date(stream)
         return self._catalog.next_number(stream)
+
+    def boots(self, stream: str) -> tuple[LoggedBoot, ...]:
+        """The boots with events in a stream, in order of time, from the catalog; to within the chunks they are in."""
+        self._bring_up_to_date(stream)
+        return tuple(LoggedBoot(*boot) for boot in self._catalog.boots(stream))
 
     def contents(self, stream: str) -> tuple[FileContents, ...]:
         """What each file of a stream holds, from the catalog."""

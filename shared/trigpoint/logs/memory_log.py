@@ -8,7 +8,7 @@ from trigpoint.events.envelope import Envelope, LogPosition
 from trigpoint.events.runs import EncodedRun, envelopes
 from trigpoint.logs.channels import packed_rows
 from trigpoint.logs.log_files import valid_stream
-from trigpoint.logs.ports import LoggedEvent
+from trigpoint.logs.ports import LoggedBoot, LoggedEvent
 
 
 class MemoryLog:
@@ -55,6 +55,16 @@ class MemoryLog:
     def next_number(self, stream: str) -> int:
         """The number the next appended event will get."""
         return len(self._streams.get(stream, []))
+
+    def boots(self, stream: str) -> tuple[LoggedBoot, ...]:
+        """The boots with events in a stream, in order of time."""
+        with self._lock:
+            rows = list(self._streams.get(stream, []))
+        stamps_ns: dict[tuple[str, str], list[int]] = {}
+        for row in rows:
+            stamps_ns.setdefault((row.identity.source, row.identity.boot_id), []).append(row.stamp_ns)
+        boots = [LoggedBoot(*drive, min(stamps), max(stamps)) for drive, stamps in stamps_ns.items()]
+        return tuple(sorted(boots, key=lambda boot: (boot.start_ns, boot.source, boot.boot_id)))
 
     def close(self) -> None:
         """Nothing to flush; what was appended stays readable."""

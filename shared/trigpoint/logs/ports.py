@@ -17,6 +17,16 @@ class LoggedEvent:
     envelope: Envelope[Event]
 
 
+@dataclass(frozen=True, slots=True)
+class LoggedBoot:
+    """One boot of a source in a stream: all its events are of the closed time range [start_ns, end_ns]."""
+
+    source: str
+    boot_id: str
+    start_ns: int
+    end_ns: int
+
+
 class EventLog(Protocol):
     """Append-only streams of events; one writer a stream."""
 
@@ -41,6 +51,10 @@ class EventLog(Protocol):
 
     def next_number(self, stream: str) -> int:
         """The number the next appended event will get; 0 for an unknown stream."""
+
+    def boots(self, stream: str) -> tuple[LoggedBoot, ...]:
+        """The boots with events in a stream, in order of time; no event is read for it, and the range may be wider than
+        the events'."""
 
     def close(self) -> None:
         """Everything flushed, files closed with their index."""

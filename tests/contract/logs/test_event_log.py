@@ -1,4 +1,5 @@
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from trigpoint.events.envelope import Envelope, EventIdentity, LogPosition
 from trigpoint.events.observed import GnssFixReceived, ImuMeasured
 from trigpoint.logs.mcap_log import McapLog
 from trigpoint.logs.memory_log import MemoryLog
-from trigpoint.logs.ports import EventLog
+from trigpoint.logs.ports import EventLog, LoggedBoot
 
 STREAM = "veh-van"
 
@@ -178,3 +179,19 @@ def test_a_name_that_is_no_unicode_is_refused(log: EventLog) -> None:
 def test_the_longest_name_of_a_vehicle_makes_a_stream(log: EventLog) -> None:
     vehicle = "車" * 60  # 180 bytes: the longest name allowed, of characters of three bytes
     assert log.append(f"veh-{vehicle}", [imu_row(0, vehicle=vehicle)]).number == 0
+
+
+def test_a_streams_boots_come_with_times_that_hold_all_their_events(log: EventLog) -> None:
+    later = [replace(row, identity=replace(row.identity, boot_id="boot-2")) for row in imu_rows(5, 8)]
+    log.append(STREAM, imu_rows(0, 3))
+    log.append(STREAM, later)
+    stamps_ns = [START_NS + n * STEP_NS for n in (0, 2, 5, 7)]
+    boot_id = imu_row(0).identity.boot_id
+    assert log.boots(STREAM) == (
+        LoggedBoot("van", boot_id, stamps_ns[0], stamps_ns[1]),
+        LoggedBoot("van", "boot-2", stamps_ns[2], stamps_ns[3]),
+    )
+
+
+def test_an_unknown_stream_has_no_boots(log: EventLog) -> None:
+    assert log.boots(STREAM) == ()
