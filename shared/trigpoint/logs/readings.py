@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import cast
 
 from trigpoint.errors import InputError
-from trigpoint.events.corrected import AnchorLabelled, Corrected, anchors_in_force
+from trigpoint.events.corrected import AnchorLabelled, Corrected, anchors_in_force, excluded_drives
 from trigpoint.events.drives import Drive, drives_of
 from trigpoint.events.envelope import Envelope
 from trigpoint.events.estimated import FixJudged
@@ -50,24 +50,31 @@ def vehicle_streams(log: EventLog) -> tuple[str, ...]:
 
 
 def logged_drives(log: EventLog, *, progress: Progress = in_silence) -> tuple[Drive, ...]:
-    """Every drive in the log. Raises InputError where there is none."""
-    streams = vehicle_streams(log)
+    """Every drive in the log that is not excluded. Raises InputError where there is none."""
+    streams, excluded = vehicle_streams(log), excluded_drives(logged_corrections(log))
     total = sum(log.next_number(stream) for stream in streams)
     rows: list[Envelope[Observed]] = []
-    for stream in streams:
-        for logged in log.read(stream):
+    for done, logged in enumerate((row for stream in streams for row in log.read(stream)), start=1):
+        identity = logged.envelope.identity
+        if (identity.source, identity.boot_id) not in excluded:
             rows.append(cast(Envelope[Observed], logged.envelope))
-            if len(rows) % PROGRESS_COUNT == 0:
-                progress(len(rows), total)
+        if done % PROGRESS_COUNT == 0:
+            progress(done, total)
     if not rows:
-        raise InputError("the log holds no vehicle's events: nothing was ingested yet")
+        without = f"all of the log's {len(excluded)} drives are excluded; `trigpoint drives include` takes one back"
+        raise InputError(without if total else "the log holds no vehicle's events: nothing was ingested yet")
     progress(total, total)
     return drives_of(rows)
 
 
+def logged_corrections(log: EventLog) -> tuple[Corrected, ...]:
+    """Everything people added or took back, in order of appending."""
+    return tuple(cast(Corrected, row.envelope.event) for row in log.read(LABEL_STREAM))
+
+
 def logged_anchors(log: EventLog) -> tuple[AnchorLabelled, ...]:
     """The anchors in force: of several labels of one name in one image the last, unless it was retracted since."""
-    return anchors_in_force(cast(Corrected, row.envelope.event) for row in log.read(LABEL_STREAM))
+    return anchors_in_force(logged_corrections(log))
 
 
 def logged_verdicts(log: EventLog) -> tuple[FixJudged, ...]:
