@@ -16,6 +16,7 @@ from trigpoint.bus.attachment import encode_attachment, encode_bundle, run_attac
 from trigpoint.bus.inbox import INBOX_BYTES, INBOX_CAPACITY, Inbox
 from trigpoint.bus.key_expressions import checked_expression, checked_key
 from trigpoint.bus.ports import BusMessage, BusRun
+from trigpoint.bus.tls import TlsFiles, checked_endpoints, tls_values
 from trigpoint.errors import ServiceError
 
 PROTOBUF = "application/protobuf"
@@ -28,7 +29,8 @@ CLAIM_LOOK_S = 5.0  # for the claims of everyone reachable; the answer comes in 
 class ZenohSettings:
     """A session's endpoints such as "tcp/127.0.0.1:7447"; scouting finds peers without endpoints, by multicast.
 
-    A client waits `connect_timeout_s` for its first connection; a later one comes back by itself.
+    A client waits `connect_timeout_s` for its first connection; a later one comes back by itself. With `tls` both ends
+    of every link show certificates. Raises InputError where endpoints and `tls` do not go together.
     """
 
     listen: tuple[str, ...] = ()
@@ -39,9 +41,14 @@ class ZenohSettings:
     inbox_capacity: int = INBOX_CAPACITY
     inbox_bytes: int = INBOX_BYTES
     message_limit_bytes: int = 64 * 1024 * 1024
+    tls: TlsFiles | None = None
+
+    def __post_init__(self) -> None:
+        checked_endpoints(self.listen, self.connect, self.tls)
 
 
-def _config(settings: ZenohSettings) -> zenoh.Config:
+def session_config(settings: ZenohSettings) -> zenoh.Config:
+    """What Zenoh is told. Raises InputError for files that are not there, or a key that others may read."""
     config = zenoh.Config()
     for name, value in (
         ("mode", settings.mode),
@@ -51,6 +58,7 @@ def _config(settings: ZenohSettings) -> zenoh.Config:
         ("scouting/multicast/enabled", settings.scouting),
         ("scouting/gossip/enabled", settings.scouting),
         ("transport/link/rx/max_message_size", settings.message_limit_bytes),
+        *(() if settings.tls is None else tls_values(settings.tls.checked())),
     ):
         config.insert_json5(name, json.dumps(value))
     return config
@@ -138,7 +146,7 @@ class ZenohBus:
         self._subscriptions: list[ZenohSubscription] = []
         self._claims: list[ZenohClaim] = []
         try:
-            self._session = zenoh.open(_config(settings))
+            self._session = zenoh.open(session_config(settings))
         except zenoh.ZError as error:
             raise ServiceError(f"no Zenoh session with {settings}: {error}") from error
 
