@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import click
 
 from trigpoint.errors import InputError, TrigpointError
+from trigpoint.observability.masking import without_password
 from trigpoint_cli.output import CommandIncomplete
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
@@ -116,7 +117,7 @@ def _line_of(error: Exception) -> str:
         line = str(error)
     else:
         line = f"unexpected {type(error).__name__}: {error} (run with --debug for where)"
-    return " ".join(line.split())
+    return without_password(" ".join(line.split()))
 
 
 def main() -> None:

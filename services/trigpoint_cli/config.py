@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from trigpoint.configuration.showing import shown_values, toml_lines
+from trigpoint.observability.tracing import require_tracing
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering
 from trigpoint_cli.settings import configuration_options, configured_settings, secrets_of
 
@@ -39,5 +40,7 @@ def check(config: Path | None, flags: tuple[str, ...], *, screen: Screen) -> Ans
     """Say whether the services would start with this configuration; everything that is wrong is named."""
     found = configured_settings(config, flags)
     secrets_of(found.settings)  # its files can be read
+    if found.settings.tracing.endpoint is not None:
+        require_tracing()
     given = len(found.given)
     return Answer({"valid": True, "given": given}, (f"the configuration is valid; {given} values are set",))

@@ -15,6 +15,7 @@ from trigpoint.observability.endpoint import Endpoint, EndpointSettings, Health
 from trigpoint.observability.log_lines import log_to
 from trigpoint.observability.metrics import Instruments
 from trigpoint.observability.running import Service
+from trigpoint.observability.tracing import Spans, TracesSettings, opened_spans
 from trigpoint_cli.output import Answer, Screen, answering
 from trigpoint_cli.served import ServedService
 from trigpoint_cli.settings import Settings, configuration_options, configured_settings, secrets_of
@@ -57,13 +58,22 @@ def command(
 def run_process(process: str, settings: Settings, *, until_input_ends: bool) -> Ran:
     """The process's service ran until it was told to stop. Raises what ended it otherwise."""
     log_to(process, level=settings.logging.level, form=settings.logging.form, secrets=secrets_of(settings))
-    instruments = Instruments(process)
-    with stop_requests(with_standard_input=until_input_ends) as requests:
+    with stop_requests(with_standard_input=until_input_ends) as requests, _spans(process, settings) as spans:
+        instruments = Instruments(process, heard=spans)
         opener: Opener = importlib.import_module(f"trigpoint_cli.serving.{process}").opened
         served = ServedService(lambda: opener(settings, instruments), instruments)
         reason = serve_until_stopped(served, settings, requests)
     logger.info("stopped", extra={"reason": reason})
     return Ran(process=process, reason=reason)
+
+
+def _spans(process: str, settings: Settings) -> AbstractContextManager[Spans | None]:
+    """Who hears of the work that is timed, if the configuration names an endpoint. Raises InputError."""
+    tracing = settings.tracing
+    if tracing.endpoint is None:
+        return nullcontext()
+    chosen = TracesSettings(endpoint=tracing.endpoint, sampled_share=tracing.sampled_share, timeout_s=tracing.timeout_s)
+    return opened_spans(process, chosen)
 
 
 def serve_until_stopped(served: ServedService, settings: Settings, requests: StopRequests) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 
 from trigpoint.configuration.tree import KeyPath
 from trigpoint.errors import InputError
+from trigpoint.observability.masking import without_password
 
 PREFIX, SEPARATOR = "TRIGPOINT_", "__"
 SIZE_LIMIT = 1_000_000  # bytes of a configuration file
@@ -61,6 +62,8 @@ def _flag(word: str) -> tuple[KeyPath, Given]:
     path = tuple(name.strip().split("."))
     if not equals or len(path) < 2:
         raise InputError(f"--set {name}: SECTION.KEY=VALUE is needed")
+    if without_password(text) != text:
+        raise InputError(f"--set {name}: holds a password, which every process list would show; use a file of it")
     return path, Given(value=text, origin="flag --set", is_text=True)
 
 

@@ -1,15 +1,33 @@
 """The numbers a service counts and measures about itself, in Prometheus' terms."""
 
+from collections.abc import Callable
+
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
 
 SECONDS = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0)
 
 
-class Instruments:
-    """One service's instruments, in a registry of their own. Labels: `vehicle`, and `reason` as in EventRejected."""
+class Durations(Histogram):
+    """Durations in seconds; `heard`, if it is set, is told of each one as well, with the name of the work."""
 
-    def __init__(self, service: str) -> None:
+    heard: Callable[[str, float], None] | None = None
+
+    def observe(self, amount: float, exemplar: dict[str, str] | None = None) -> None:
+        """One more duration, of work that ends now."""
+        super().observe(amount, exemplar)
+        if self.heard is not None:
+            self.heard(self._name.removeprefix("trigpoint_").removesuffix("_seconds"), amount)
+
+
+class Instruments:
+    """One service's instruments, in a registry of their own. Labels: `vehicle`, and `reason` as in EventRejected.
+
+    `heard` is told the name and the seconds of each work that is timed: whoever traces makes a span of it.
+    """
+
+    def __init__(self, service: str, *, heard: Callable[[str, float], None] | None = None) -> None:
         self.service = service
+        self._heard = heard
         self.registry = CollectorRegistry()
         self.accepted = self._counter("accepted", "Events accepted.", "vehicle")
         self.duplicates = self._counter("duplicates", "Messages that were there already.", "vehicle")
@@ -26,6 +44,7 @@ class Instruments:
         self.fsync_seconds = self._histogram("fsync_seconds", "Durations of making a group of events durable.")
         self.update_seconds = self._histogram("update_seconds", "Durations of incremental updates.")
         self.solve_seconds = self._histogram("solve_seconds", "Durations of whole solves.")
+        self.projection_seconds = self._histogram("projection_seconds", "Durations of transactions of a projection.")
 
     def _counter(self, name: str, text: str, *labels: str) -> Counter:
         return Counter(f"trigpoint_{name}", text, labels, registry=self.registry)
@@ -34,7 +53,9 @@ class Instruments:
         return Gauge(f"trigpoint_{name}", text, registry=self.registry)
 
     def _histogram(self, name: str, text: str) -> Histogram:
-        return Histogram(f"trigpoint_{name}", text, registry=self.registry, buckets=SECONDS)
+        durations = Durations(f"trigpoint_{name}", text, registry=self.registry, buckets=SECONDS)
+        durations.heard = self._heard
+        return durations
 
     def exposition(self) -> bytes:
         """All of it as text for Prometheus to scrape."""
