@@ -14,6 +14,10 @@ ACKNOWLEDGEMENT_SCHEMA = "trigpoint.v1.Acknowledgement"
 """An empty message: its identity (vehicle, boot, sequence) says it all. Every message of that boot up to and
 including the sequence was made durable or refused for good; sequence -1 for none yet."""
 
+DROPPED_SCHEMA = "trigpoint.v1.Dropped"
+"""Stands, with an empty payload, for a message its vehicle no longer has: one dropped from a full spool, or damaged
+there. No event has this schema: ingest refuses it under its identity, and so acknowledges what comes after it."""
+
 
 def uplink_key(vehicle: str, event_class: type | None, *, root: str = DEFAULT_ROOT) -> str:
     """The key a vehicle sends its observations of a class on, None for what no class is known for.
