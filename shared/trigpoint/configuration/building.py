@@ -130,6 +130,8 @@ def _limits(error: ValidationError) -> str:
 def _unknown(path: KeyPath, given: Given, tree: Table, elsewhere: Mapping[KeyPath, KeyPath]) -> str:
     if path in elsewhere:
         return f"{_named(path)}: {_named(elsewhere[path])} sets it ({given.origin})"
+    if len(path) == 1:
+        return f"{path[0]}: stands in no section, and is no section itself ({given.origin})"
     if path[0] not in tree.tables:
         return f"no section [{path[0]}]{_nearest(path[0], list(tree.tables))} ({given.origin})"
     known = [".".join(found[1:]) for found in tree.value_types() if found[0] == path[0]]

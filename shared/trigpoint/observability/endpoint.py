@@ -140,7 +140,7 @@ class Endpoint:
             self._server = _Server(settings, health)
         except OSError as error:
             raise ServiceError(f"nothing can be served on {settings.host}:{settings.port}: {error.strerror}") from error
-        self._thread = threading.Thread(target=self._server.serve_forever, name="endpoint", daemon=True)
+        self._thread = threading.Thread(target=self._server.serve_forever, args=(0.05,), name="endpoint", daemon=True)
         self._thread.start()
 
     @property
