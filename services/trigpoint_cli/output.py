@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
+from datetime import UTC, datetime
 from typing import Any, Protocol
 
 import click
@@ -18,6 +19,7 @@ from trigpoint.errors import InputError
 
 JsonObject = dict[str, Any]
 
+NS_PER_S = 1e9
 FRACTION_STEPS = 1000
 LIVE_S, WRITTEN_S = 0.2, 2.0  # between two states of a bar, on a terminal and in a file
 
@@ -135,6 +137,11 @@ def plain(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return value if isinstance(value, str | int | bool) or value is None else str(value)
+
+
+def utc(stamp_ns: int) -> str:
+    """A time as people read it, to the second."""
+    return datetime.fromtimestamp(stamp_ns / NS_PER_S, tz=UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
 def metres(value: float) -> str:

@@ -6,13 +6,13 @@ from json import dumps
 
 from trigpoint.errors import FrameRefused
 from trigpoint.events.codec import encode, schema_name
-from trigpoint.events.corrected import AnchorLabelled, anchors_in_force
+from trigpoint.events.corrected import AnchorLabelled
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.observed import EventRefused, MapFramePinned
 from trigpoint.geodesy.projection import MapFrame
 from trigpoint.logs.ports import EventLog
-from trigpoint.logs.readings import logged_frame, pinned_frame
+from trigpoint.logs.readings import logged_anchors, logged_frame, pinned_frame
 from trigpoint_ingest.core.anchors import (
     ANCHOR_SOURCE,
     LabelledAnchors,
@@ -31,7 +31,7 @@ CORRECTIONS_STREAM = STREAM_PATTERNS[AnchorLabelled]
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnchorImportReport:
     """`added` anchors are new in the log, `known` were there already with the same content, `relabelled` of the
-    added ones replace one of the same name and image; `refused` ones are kept aside with their reasons.
+    added ones replace one in force of the same name and image; `refused` ones are kept aside with their reasons.
     """
 
     added: int
@@ -51,7 +51,7 @@ def import_anchors(found: LabelledAnchors, log: EventLog, *, stamp_ns: int = 0) 
     """
     located = near_map(found.anchors, _frame(found.anchors, log, stamp_ns)) if found.anchors else found
     refused = found.refused + located.refused if found.anchors else found.refused
-    in_force = {(anchor.anchor, anchor.image): anchor for anchor in anchors_in_force(_logged(log))}
+    in_force = {(anchor.anchor, anchor.image): anchor for anchor in logged_anchors(log)}
     new = [anchor for anchor in located.anchors if in_force.get((anchor.anchor, anchor.image)) != anchor]
     if new:
         log.append(CORRECTIONS_STREAM, _rows(new, stamp_ns, number=log.next_number(CORRECTIONS_STREAM)))
@@ -62,11 +62,6 @@ def import_anchors(found: LabelledAnchors, log: EventLog, *, stamp_ns: int = 0) 
         relabelled=sum((anchor.anchor, anchor.image) in in_force for anchor in new),
         refused=refused,
     )
-
-
-def _logged(log: EventLog) -> list[AnchorLabelled]:
-    events = [row.envelope.event for row in log.read(CORRECTIONS_STREAM, kinds=(AnchorLabelled,))]
-    return [event for event in events if isinstance(event, AnchorLabelled)]
 
 
 def _frame(anchors: Sequence[AnchorLabelled], log: EventLog, stamp_ns: int) -> MapFrame:

@@ -1,5 +1,7 @@
 """What ingest may be told."""
 
+import os
+import pwd
 from dataclasses import dataclass, field
 
 from trigpoint.events.keys import DEFAULT_MAP, DEFAULT_ROOT
@@ -24,3 +26,11 @@ class IngestSettings:
     gap_timeout_s: float = 30.0
     held_limit: int = 16_384
     refused_payload_limit: int = 65_536
+
+
+def operating_user() -> str:
+    """The name of the user this process runs as: who makes corrections, unless somebody else is named."""
+    try:
+        return pwd.getpwuid(os.getuid()).pw_name
+    except KeyError:
+        return f"user {os.getuid()}"
