@@ -9,6 +9,7 @@ from urllib.parse import unquote, urlsplit
 
 import click
 
+from trigpoint.bus.router import RouterSettings
 from trigpoint.bus.zenoh_bus import ZenohSettings
 from trigpoint.configuration.building import Configured, configured
 from trigpoint.configuration.given import from_environment, from_flags, from_toml
@@ -29,7 +30,7 @@ from trigpoint_ingest.settings import IngestSettings
 from trigpoint_optimisation.settings import SolveSettings
 
 ROUTER_ENDPOINT = "tcp/127.0.0.1:7447"
-ROUTER = ZenohSettings(mode="router", listen=(ROUTER_ENDPOINT,))
+ROUTER = RouterSettings(listen=(ROUTER_ENDPOINT,))
 CLIENT_OF_ROUTER = ZenohSettings(mode="client", connect=(ROUTER_ENDPOINT,), connect_timeout_s=10.0)
 NAMES_OF_FLEET = SetElsewhere((("root", "fleet.root"), ("map_name", "fleet.map")))
 
@@ -44,7 +45,7 @@ class Settings:
     ingest: Annotated[IngestSettings, NAMES_OF_FLEET] = field(default_factory=IngestSettings)
     filtering: FilterSettings = field(default_factory=FilterSettings)
     optimisation: SolveSettings = field(default_factory=SolveSettings)
-    router: ZenohSettings = field(default_factory=lambda: ROUTER)
+    router: RouterSettings = field(default_factory=lambda: ROUTER)
     up: UpSettings = field(default_factory=UpSettings)
     serve: ServeSettings = field(default_factory=ServeSettings)
     http: HttpSettings = field(default_factory=HttpSettings)
