@@ -1,0 +1,159 @@
+"""A segment's bytes record by record, over whatever is damaged in between; and the same with its data dropped."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from trigpoint.errors import LogDamaged
+from trigpoint.events.codec import schema_name
+from trigpoint.events.observed import VehicleDescribed
+from trigpoint_vehicle.core.spool_records import (
+    CHANNEL,
+    DROPPED,
+    MESSAGE,
+    SEGMENT,
+    Record,
+    SpoolChannel,
+    channel_of,
+    channel_record,
+    encode_record,
+    next_whole_record,
+    record_at,
+)
+
+DESCRIPTION_SCHEMA = schema_name(VehicleDescribed)
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Bytes that hold no whole record."""
+
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contents:
+    """What a segment holds; `whole_bytes` is where its last whole record ends."""
+
+    messages: int
+    payload_bytes: int
+    whole_bytes: int
+    gaps: tuple[Gap, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Dropped:
+    """A segment without its sensor data: its bytes, and what went."""
+
+    data: bytes
+    messages: int
+    payload_bytes: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Range:
+    """Messages of a boot, both ends included, that are not there any more."""
+
+    channel: SpoolChannel
+    first: int
+    last: int
+
+
+def walk(data: bytes) -> Iterator[Record | Gap]:
+    """The whole records in order, and where there is none the bytes up to the next."""
+    at = 0
+    while at < len(data):
+        record = _whole_at(data, at)
+        if record is not None:
+            yield record
+            at = record.end
+            continue
+        following = next_whole_record(data, at)
+        end = len(data) if following is None else following
+        yield Gap(at, end)
+        at = end
+
+
+def _whole_at(data: bytes, at: int) -> Record | None:
+    try:
+        return record_at(data, at)
+    except LogDamaged:
+        return None
+
+
+def contents_of(data: bytes) -> Contents:
+    """How much a segment holds, and how much of it is whole."""
+    messages = payload_bytes = whole_bytes = 0
+    gaps, channels = [], set()
+    for part in walk(data):
+        if isinstance(part, Gap):
+            gaps.append(part)
+            continue
+        whole_bytes = part.end
+        if part.kind == CHANNEL:
+            channels.add(part.channel)
+        if part.kind == MESSAGE and part.channel in channels:
+            messages += 1
+            payload_bytes += len(part.body)
+    return Contents(messages=messages, payload_bytes=payload_bytes, whole_bytes=whole_bytes, gaps=tuple(gaps))
+
+
+def without_data(segments: Sequence[bytes]) -> Dropped:
+    """The segments as one, in which descriptions stay and everything else is only known to be gone."""
+    kept: list[_Range | tuple[SpoolChannel, Record]] = []
+    messages = payload_bytes = 0
+    for channel, record in _messages(segments):
+        if record.kind == MESSAGE and channel.schema_name == DESCRIPTION_SCHEMA:
+            kept.append((channel, record))
+            continue
+        last = record.stamp_ns if record.kind == DROPPED else record.sequence
+        _extend(kept, _Range(channel, record.sequence, last))
+        messages += record.kind == MESSAGE
+        payload_bytes += len(record.body)
+    return Dropped(
+        data=b"".join((_beginning(segments), *_encoded(kept))), messages=messages, payload_bytes=payload_bytes
+    )
+
+
+def _messages(segments: Sequence[bytes]) -> Iterator[tuple[SpoolChannel, Record]]:
+    for data in segments:
+        channels: dict[int, SpoolChannel] = {}
+        for part in walk(data):
+            if isinstance(part, Gap):
+                continue
+            if part.kind == CHANNEL:
+                channels[part.channel] = channel_of(part)
+            elif part.kind in (MESSAGE, DROPPED) and part.channel in channels:
+                yield channels[part.channel], part
+
+
+def _extend(kept: list[_Range | tuple[SpoolChannel, Record]], gone: _Range) -> None:
+    before = kept[-1] if kept else None
+    if isinstance(before, _Range) and before.channel.boot_id == gone.channel.boot_id and before.last + 1 == gone.first:
+        kept[-1] = replace(before, last=gone.last)
+    else:
+        kept.append(gone)
+
+
+def _beginning(segments: Sequence[bytes]) -> bytes:
+    for data in segments:
+        first = _whole_at(data, 0)
+        if first is not None and first.kind == SEGMENT:
+            return data[: first.end]
+    return b""
+
+
+def _encoded(kept: Iterable[_Range | tuple[SpoolChannel, Record]]) -> Iterator[bytes]:
+    numbers: dict[SpoolChannel, int] = {}
+    for one in kept:
+        channel = one.channel if isinstance(one, _Range) else one[0]
+        if channel not in numbers:
+            numbers[channel] = len(numbers)
+            yield channel_record(numbers[channel], channel)
+        if isinstance(one, _Range):
+            yield encode_record(DROPPED, numbers[channel], one.first, one.last, 0)
+        else:
+            record = one[1]
+            yield encode_record(
+                MESSAGE, numbers[channel], record.sequence, record.stamp_ns, record.spooled_ns, record.body
+            )
