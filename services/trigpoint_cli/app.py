@@ -20,6 +20,7 @@ FULL_DISK = (errno.ENOSPC, errno.EDQUOT)
 COMMANDS = {
     "demo": ("trigpoint_cli.demo", "Simulate a campus and take it all the way to a map, a report and its errors."),
     "config": ("trigpoint_cli.config", "Show or check the configuration of a deployment."),
+    "certs": ("trigpoint_cli.certs", "Run a private authority: who takes part in a fleet, and as what."),
     "serve": ("trigpoint_cli.serve", "Run one service as a process of its own."),
     "router": ("trigpoint_cli.router", "Run the Zenoh router of a fleet."),
     "up": ("trigpoint_cli.up", "Run every service of one machine, each a process of its own, kept running."),
