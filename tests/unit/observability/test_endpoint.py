@@ -85,14 +85,16 @@ def test_only_its_pages_are_there_to_be_read(method: str, path: str, status: int
 def test_more_connections_than_allowed_are_closed_unanswered_and_the_next_is_answered() -> None:
     patient = Patient()
     with answering(patient) as address:
-        waiting = [threading.Thread(target=asked, args=(address, "/metrics")) for _ in range(2)]
-        [thread.start() for thread in waiting]
+        first, second = (threading.Thread(target=asked, args=(address, "/metrics")) for _ in range(2))
+        first.start()
+        second.start()
         assert patient.asked.acquire(timeout=5.0)
         assert patient.asked.acquire(timeout=5.0)
         with pytest.raises((http.client.RemoteDisconnected, ConnectionError)):
             asked(address, "/healthz")
         patient.let_go.set()
-        [thread.join() for thread in waiting]
+        first.join()
+        second.join()
         assert answered_again(address)
 
 
