@@ -1,9 +1,13 @@
 """What every test may ask for, and the rule that some tests must not be skipped in continuous integration."""
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from landmark_databases.cluster import Cluster
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 RECORDED_DRIVES = REPOSITORY.parent / "shared" / "data"
@@ -15,6 +19,24 @@ pytest_plugins = ["pytester"]
 def recorded_drives() -> Path:
     """The folder of recorded drives beside the repository; ask for it in tests marked `data`."""
     return RECORDED_DRIVES
+
+
+@pytest.fixture(scope="session")
+def postgis() -> Iterator["Cluster"]:
+    """A PostgreSQL server with PostGIS, for this run only; ask for it in tests marked `postgis`."""
+    from landmark_databases.cluster import binaries, running_cluster
+
+    if binaries() is None:
+        pytest.skip("no PostgreSQL with PostGIS is installed")
+    with running_cluster(durable=False) as cluster:
+        yield cluster
+
+
+@pytest.fixture
+def postgis_url(postgis: "Cluster", monkeypatch: pytest.MonkeyPatch) -> str:
+    """The URL of an empty database of its own; the password is where PostgreSQL's clients look it up."""
+    monkeypatch.setenv("PGPASSFILE", str(postgis.password_table))
+    return postgis.url(postgis.created())
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -7,7 +7,8 @@ TrigpointError
 │   ├── FrameRefused      a CRS, epoch or position that would have to be guessed
 │   └── AlignmentRefused  the data cannot fix the map's position or heading
 └── ServiceError          the environment failed: stop the service (exit status 1)
-    └── AppendFailed      an event could not be made durable
+    ├── AppendFailed      an event could not be made durable
+    └── DatabaseUnavailable  the database does not answer, is busy or full: open it anew later
 """
 
 
@@ -46,3 +47,7 @@ class ServiceError(TrigpointError):
 
 class AppendFailed(ServiceError):
     """An event could not be made durable."""
+
+
+class DatabaseUnavailable(ServiceError):
+    """The database does not answer, is busy or is full: who can wait opens it anew, and nothing is lost."""

@@ -59,6 +59,11 @@ class Cluster:
         """A file that holds the owner's password."""
         return self.folder / "password"
 
+    @property
+    def password_table(self) -> Path:
+        """The same as PostgreSQL's own clients read it, named by PGPASSFILE."""
+        return self.folder / "pgpass"
+
     def url(self, database: str) -> str:
         """The database's URL, without password."""
         return f"postgresql+psycopg://{OWNER}@{LOOPBACK}:{self.port}/{database}"
@@ -122,6 +127,8 @@ def running_cluster(*, durable: bool) -> Iterator[Cluster]:
     cluster = Cluster(folder, free_port(), count(1))
     try:
         cluster.password_file.write_text(f"{PASSWORD}\n", encoding="utf-8")
+        cluster.password_table.write_text(f"*:*:*:{OWNER}:{PASSWORD}\n", encoding="utf-8")
+        cluster.password_table.chmod(0o600)
         if os.geteuid() == 0:
             entry = pwd.getpwnam(SERVER_USER)
             for path in (folder, cluster.password_file):

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from geoalchemy2 import Geometry, WKBElement
 from sqlalchemy import REAL, BigInteger, Boolean, Column, Double, Integer, MetaData, Table, Text, UniqueConstraint
 from sqlalchemy.engine import Dialect
 from sqlalchemy.types import LargeBinary, TypeDecorator, TypeEngine, UserDefinedType
@@ -46,6 +45,8 @@ class LandmarkGeometry(TypeDecorator[tuple[int, Coordinates]]):
     def load_dialect_impl(self, dialect: Dialect) -> TypeEngine[Any]:
         """The column type of a database."""
         if dialect.name == "postgresql":
+            from geoalchemy2 import Geometry  # costs half a second, which a GeoPackage does not need
+
             return Geometry(self.geometry_name, srid=UNKNOWN_SRID, spatial_index=False)
         return dialect.type_descriptor(GeometryColumn(self.geometry_name))
 
@@ -60,13 +61,11 @@ class LandmarkGeometry(TypeDecorator[tuple[int, Coordinates]]):
             return encoded_point(*points[0], srs_id=srs_id)
         return encoded_line(points, srs_id=srs_id)
 
-    def process_result_value(
-        self, value: bytes | WKBElement | None, dialect: Dialect
-    ) -> tuple[int, Coordinates] | None:
+    def process_result_value(self, value: Any, dialect: Dialect) -> tuple[int, Coordinates] | None:
         """The srs id and the coordinates."""
         if value is None:
             return None
-        if isinstance(value, WKBElement):
+        if dialect.name == "postgresql":
             return postgis_geometry.decoded(bytes.fromhex(value.desc))
         return int.from_bytes(value[4:8], "little", signed=True), decoded(value)
 

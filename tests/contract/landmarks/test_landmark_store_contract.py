@@ -1,6 +1,7 @@
 """What every landmark store promises; each joins by a line in `stores`."""
 
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -12,16 +13,25 @@ from trigpoint.landmarks.geopackage_store import GeoPackageStore
 from trigpoint.landmarks.memory_store import MemoryStore
 from trigpoint.landmarks.model import Checkpoint, Landmark, LandmarkChanges
 from trigpoint.landmarks.ports import LandmarkStore
+from trigpoint.landmarks.postgis_store import PostgisStore
 from trigpoint.landmarks.queries import DegreeBox, Disc, LandmarkQuery
 
 EVERYWHERE = DegreeBox(lon_min_deg=-180.0, lat_min_deg=-90.0, lon_max_deg=180.0, lat_max_deg=90.0)
 
 
-@pytest.fixture(params=["memory", "geopackage"])
+def opened(kind: str, request: pytest.FixtureRequest, folder: Path) -> LandmarkStore:
+    """A new store of a kind."""
+    if kind == "memory":
+        return MemoryStore()
+    if kind == "geopackage":
+        return GeoPackageStore(folder / "map.gpkg")
+    return PostgisStore(request.getfixturevalue("postgis_url"))
+
+
+@pytest.fixture(params=["memory", "geopackage", pytest.param("postgis", marks=pytest.mark.postgis)])
 def store(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[LandmarkStore]:
-    opened: LandmarkStore = MemoryStore() if request.param == "memory" else GeoPackageStore(tmp_path / "map.gpkg")
-    yield opened
-    opened.close()
+    with closing(opened(request.param, request, tmp_path)) as store:
+        yield store
 
 
 @pytest.fixture
