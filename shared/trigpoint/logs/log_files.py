@@ -1,7 +1,9 @@
 """The files of one stream: their names, what they hold, and what a crash left of the last one mended."""
 
+import fcntl
 import os
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from mcap.records import Chunk
@@ -13,6 +15,7 @@ from trigpoint.logs.file_bytes import FileBytes
 from trigpoint.logs.mcap_scan import McapScan
 from trigpoint.logs.mcap_writer import FileIndex
 
+LOCK_NAME = ".lock"  # in a stream's folder, held by its writer
 NUMBER_DIGITS = 12
 SUFFIX = ".mcap"
 NAME_LIMIT_BYTES = 255  # of a folder's name, in UTF-8, on all usual file systems
@@ -39,12 +42,19 @@ def file_numbers(folder: Path) -> tuple[int, ...]:
 
 
 def entry_of(folder: Path, stream: str, first_number: int) -> CatalogEntry:
-    """What a file holds, read from itself: every whole chunk before the first one lost."""
+    """What a file holds, read from itself: every whole chunk before the first one lost; all of it durable."""
     scan = McapScan(file_path(folder, first_number))
+    _make_durable(scan.path)
     size_bytes = scan.path.stat().st_size
     chunks = tuple(_catalog_chunks(scan, first_number))
     file = CatalogFile(stream, first_number, size_bytes, scan.complete, str(scan.loss) if scan.loss else "")
     return CatalogEntry(file, chunks, tuple(sorted(scan.channels.items())))
+
+
+def _make_durable(path: Path) -> None:
+    """What a killed writer left in the system's memory is on the disk, before anyone is told of it."""
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
 
 
 def _catalog_chunks(scan: McapScan, first_number: int) -> Iterator[CatalogChunk]:
@@ -58,26 +68,51 @@ def _catalog_chunks(scan: McapScan, first_number: int) -> Iterator[CatalogChunk]
         number += len(channels)
 
 
-def bring_up_to_date(catalog: Catalog, folder: Path, stream: str) -> None:
+def bring_up_to_date(catalog: Catalog, folder: Path, stream: str, *, alone: bool = False) -> None:
     """The catalog says of a stream what its files say: those whose size it does not know are read.
 
-    A file that lost chunks the catalog knows stays as it was there: reading it names what is gone.
+    A file that lost chunks the catalog knows stays as it was there: reading it names what is gone. Where another
+    process writes the stream, the files it entered are left to it: what it has not entered is not durable yet;
+    `alone`: there is no other, the caller holds the stream's lock.
     """
     known = {file.first_number: file for file in catalog.files(stream)}
     there = file_numbers(folder)
-    for first_number in there:
-        size_bytes = file_path(folder, first_number).stat().st_size
-        if first_number not in known or known[first_number].size_bytes != size_bytes:
+    grown = [number for number in there if number not in known or known[number].size_bytes != _size(folder, number)]
+    if grown and not alone and has_writer(folder):
+        grown = [number for number in grown if number not in known]
+    for first_number in grown:
+        with suppress(FileNotFoundError):  # retained away meanwhile
             catalog.replace(entry_of(folder, stream, first_number))
     for gone in known.keys() - set(there):
         catalog.remove(known[gone])
 
 
+def _size(folder: Path, first_number: int) -> int:
+    """In bytes; -1 for a file that is gone."""
+    try:
+        return file_path(folder, first_number).stat().st_size
+    except FileNotFoundError:
+        return -1
+
+
+def has_writer(folder: Path) -> bool:
+    """Whether a process has the stream open for appending."""
+    try:
+        lock = (folder / LOCK_NAME).open("rb")
+    except FileNotFoundError:
+        return False
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        return False
+
+
 def lost_chunks(catalog: Catalog, entry: CatalogEntry) -> tuple[CatalogChunk, ...]:
     """Chunks of a file that the catalog knows, so that they were durable once, and the file has no more."""
     first_number = entry.file.first_number
-    known = catalog.chunks(entry.file.stream, first_number=first_number)
-    return tuple(chunk for chunk in known if chunk.first_number == first_number)[len(entry.chunks) :]
+    return catalog.file_chunks(entry.file.stream, first_number)[len(entry.chunks) :]
 
 
 def mend(catalog: Catalog, folder: Path, stream: str) -> None:

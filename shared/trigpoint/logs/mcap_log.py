@@ -1,11 +1,11 @@
 """The event log in MCAP files: `<directory>/<stream>/<first number>.mcap`, and a catalog of them beside."""
 
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, TypeVar
 
 from mcap.opcode import Opcode
 from mcap.records import Chunk
@@ -16,7 +16,7 @@ from trigpoint.events.envelope import Envelope, LogPosition
 from trigpoint.events.keys import DEFAULT_MAP, STREAM_PATTERNS
 from trigpoint.events.observed import MapFramePinned, VehicleDescribed
 from trigpoint.events.runs import EncodedRun
-from trigpoint.logs.catalog import NAME, Catalog, CatalogChunk, FileContents
+from trigpoint.logs.catalog import NAME, Catalog, CatalogChunk, CatalogFile, FileContents, renewed_once
 from trigpoint.logs.channels import ChannelKey, PackedRows, packed_rows
 from trigpoint.logs.chunks import FRAME, messages, parsed, unpacked
 from trigpoint.logs.log_files import bring_up_to_date, file_path, valid_stream
@@ -24,6 +24,8 @@ from trigpoint.logs.ports import LoggedBoot, LoggedEvent
 from trigpoint.logs.stream_writer import Rotation, StreamWriter
 
 DEFAULT_ROTATION = Rotation()
+AnswerT = TypeVar("AnswerT")
+Mark = tuple[int, int]  # a stream's last file and when, in ns, files came or went
 
 
 @dataclass(slots=True)
@@ -74,11 +76,12 @@ class McapLog:
         self._rotation, self._software = rotation, software
         self._map = {"name": map_name}
         self._catalog = Catalog(directory / NAME)
+        self._marks: dict[str, Mark | None] = {}
         self._writers: dict[str, StreamWriter] = {}
         self._append_locks: dict[str, threading.Lock] = {}
         self._lock = threading.RLock()
         try:
-            self._bring_all_up_to_date()
+            renewed_once(self._bring_all_up_to_date)
         except BaseException:
             self._catalog.close()
             raise
@@ -134,10 +137,14 @@ class McapLog:
 
         Raises LogDamaged where a chunk is damaged, after everything before it.
         """
-        self._bring_up_to_date(stream)
         wanted = _Wanted(first_number, from_ns, until_ns, frozenset(kinds) if kinds is not None else None)
-        chunks = self._catalog.chunks(stream, first_number=first_number, from_ns=from_ns, until_ns=until_ns)
-        damages = self._damages(stream, first_number)
+        chunks, damages = self._asked(
+            stream,
+            lambda catalog: (
+                catalog.chunks(stream, first_number=first_number, from_ns=from_ns, until_ns=until_ns),
+                _damages(catalog.files(stream), first_number),
+            ),
+        )
         by_file: dict[int, list[CatalogChunk]] = {}
         for chunk in chunks:
             by_file.setdefault(chunk.first_number, []).append(chunk)
@@ -146,20 +153,10 @@ class McapLog:
             if first in damages:
                 raise LogDamaged(damages[first])
 
-    def _damages(self, stream: str, number: int) -> dict[int, str]:
-        """Of each damaged file that may hold this number or later ones, what is wrong."""
-        files = self._catalog.files(stream)
-        ends = [*(file.first_number for file in files[1:]), number + 1]
-        return {
-            file.first_number: file.damage
-            for file, end in zip(files, ends, strict=False)  # no file, no end: an unknown stream holds nothing
-            if file.damage and end > number
-        }
-
     def _read_file(
         self, stream: str, first_number: int, chunks: Sequence[CatalogChunk], wanted: _Wanted
     ) -> Iterator[LoggedEvent]:
-        channels = wanted.channels(self._catalog.channels(stream, first_number))
+        channels = wanted.channels(self._asked(stream, lambda catalog: catalog.channels(stream, first_number)))
         needed = [chunk for chunk in chunks if not channels.keys().isdisjoint(chunk.channel_ids)]
         if not needed:
             return
@@ -172,23 +169,19 @@ class McapLog:
 
     def streams(self) -> tuple[str, ...]:
         """The names of all streams that hold an event, sorted."""
-        self._bring_all_up_to_date()
-        return self._catalog.streams()
+        return renewed_once(self._streams)
 
     def next_number(self, stream: str) -> int:
         """The number the next appended event will get; 0 for an unknown stream."""
-        self._bring_up_to_date(stream)
-        return self._catalog.next_number(stream)
+        return self._asked(stream, lambda catalog: catalog.next_number(stream))
 
     def boots(self, stream: str) -> tuple[LoggedBoot, ...]:
         """The boots with events in a stream, in order of time, from the catalog; to within the chunks they are in."""
-        self._bring_up_to_date(stream)
-        return tuple(LoggedBoot(*boot) for boot in self._catalog.boots(stream))
+        return tuple(LoggedBoot(*boot) for boot in self._asked(stream, lambda catalog: catalog.boots(stream)))
 
     def contents(self, stream: str) -> tuple[FileContents, ...]:
         """What each file of a stream holds, from the catalog."""
-        self._bring_up_to_date(stream)
-        return self._catalog.contents(stream)
+        return self._asked(stream, lambda catalog: catalog.contents(stream))
 
     def close(self) -> None:
         """All files ended with their index, all streams let go. Raises AppendFailed if that cannot be written."""
@@ -197,15 +190,50 @@ class McapLog:
             while self._writers:
                 closing.callback(self._writers.popitem()[1].close)
 
+    def _asked(self, stream: str, question: Callable[[Catalog], AnswerT]) -> AnswerT:
+        """The answer of a catalog that knows the stream's files."""
+
+        def answered() -> AnswerT:
+            self._bring_up_to_date(stream)
+            return question(self._catalog)
+
+        return renewed_once(answered)
+
+    def _streams(self) -> tuple[str, ...]:
+        self._bring_all_up_to_date()
+        return self._catalog.streams()
+
     def _bring_up_to_date(self, stream: str) -> None:
-        """The catalog says what the files say; of a stream written here it always does."""
-        if stream not in self._writers:
-            bring_up_to_date(self._catalog, self.directory / valid_stream(stream), stream)
+        """The catalog knows the stream's files: looked at again only where one came, went, or the last one grew."""
+        folder = self.directory / valid_stream(stream)
+        last = self._catalog.last_file(stream)
+        if self._mark(folder, last) is None or self._marks.get(stream) != self._mark(folder, last):
+            bring_up_to_date(self._catalog, folder, stream)
+            self._marks[stream] = self._mark(folder, self._catalog.last_file(stream))
+
+    def _mark(self, folder: Path, last: CatalogFile | None) -> Mark | None:
+        """What tells that a stream is as it was when looked at; None where it has to be looked at."""
+        try:
+            size_bytes = file_path(folder, last.first_number).stat().st_size if last else 0
+            changed_ns = folder.stat().st_mtime_ns
+        except FileNotFoundError:
+            return None
+        return (last.first_number, changed_ns) if last and size_bytes == last.size_bytes else None
 
     def _bring_all_up_to_date(self) -> None:
         there = {path.name for path in self.directory.iterdir() if path.is_dir() and not path.name.startswith(".")}
         for stream in sorted(there | set(self._catalog.streams())):
             self._bring_up_to_date(stream)
+
+
+def _damages(files: Sequence[CatalogFile], number: int) -> dict[int, str]:
+    """Of each damaged file of a stream that may hold this number or later ones, what is wrong."""
+    ends = [*(file.first_number for file in files[1:]), number + 1]
+    return {
+        file.first_number: file.damage
+        for file, end in zip(files, ends, strict=False)  # no file, no end: an unknown stream holds nothing
+        if file.damage and end > number
+    }
 
 
 def _chunk_data(file: BinaryIO, path: Path, chunk: CatalogChunk) -> bytes:

@@ -4,18 +4,19 @@ import contextlib
 import fcntl
 import os
 import sqlite3
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from io import FileIO
 from pathlib import Path
 
 from trigpoint.errors import AppendFailed
-from trigpoint.logs.catalog import Catalog, CatalogChunk, CatalogEntry, CatalogFile
+from trigpoint.logs.catalog import Catalog, CatalogChunk, CatalogEntry, CatalogFile, CatalogRenewed, renewed_once
 from trigpoint.logs.channels import PackedRows
-from trigpoint.logs.log_files import bring_up_to_date, file_path, mend
+from trigpoint.logs.log_files import LOCK_NAME, bring_up_to_date, entry_of, file_path, mend
 from trigpoint.logs.mcap_writer import CHANNEL_LIMIT, McapFileWriter, WrittenChunk
 
-LOCK_NAME = ".lock"
+LOCK_TRIES, LOCK_PAUSE_S = 25, 0.01  # a reader that asks whether there is a writer has the lock for microseconds
 FILE_BYTES = 64 * 1024 * 1024  # small enough to copy and to rescan in about a second
 FILE_SPAN_NS = 3_600_000_000_000  # an hour of measurements
 SPAN_LEAST_BYTES = 1024 * 1024  # drives of different years in one stream must not make a file an append
@@ -55,15 +56,19 @@ class StreamWriter:
         self._open_file: _OpenFile | None = None
         self._lock = _locked(folder)
         try:
-            bring_up_to_date(catalog, folder, folder.name)
-            mend(catalog, folder, folder.name)
-            self.next_number = catalog.next_number(folder.name)
+            self.next_number = renewed_once(self._taken_over)
         except (OSError, sqlite3.Error) as error:
             self._lock.close()
             raise AppendFailed(f"stream {folder.name}: not mended: {error}") from error
         except BaseException:
             self._lock.close()
             raise
+
+    def _taken_over(self) -> int:
+        """The next number, after all files were read and mended."""
+        bring_up_to_date(self._catalog, self._folder, self._folder.name, alone=True)
+        mend(self._catalog, self._folder, self._folder.name)
+        return self._catalog.next_number(self._folder.name)
 
     def append(self, rows: PackedRows, metadata: Mapping[str, Mapping[str, str]]) -> None:
         """The rows durable. Raises AppendFailed and lets the stream go; nothing of them counts as appended then,
@@ -98,6 +103,8 @@ class StreamWriter:
         file = file_path(self._folder, self.next_number).open("xb", buffering=0)
         writer = McapFileWriter(file, metadata=metadata)
         self._open_file = _OpenFile(self.next_number, file, writer, stamp_ns, stamp_ns)
+        begun = CatalogFile(self._folder.name, self.next_number, 0, finished=False)
+        renewed_once(lambda: self._catalog.replace(CatalogEntry(begun, (), ())))
         _sync_folder(self._folder)
         _sync_folder(self._folder.parent)
         return self._open_file
@@ -114,7 +121,15 @@ class StreamWriter:
         channels = [(number, key) for key, number in target.writer.channels.items() if number > target.channels_known]
         target.channels_known = len(target.writer.channels)
         state = self._state(target, finished=False)
-        self._catalog.add(CatalogEntry(state, tuple(entered), tuple(channels)))
+        self._add(CatalogEntry(state, tuple(entered), tuple(channels)), target)
+
+    def _add(self, entry: CatalogEntry, target: _OpenFile) -> None:
+        """The entry in the catalog; if that was begun anew, everything the file holds."""
+        try:
+            self._catalog.add(entry, known_bytes=target.durable_bytes)
+        except CatalogRenewed:
+            whole = entry_of(self._folder, self._folder.name, target.first_number)
+            renewed_once(lambda: self._catalog.replace(whole))
 
     def _state(self, target: _OpenFile, *, finished: bool) -> CatalogFile:
         return CatalogFile(self._folder.name, target.first_number, target.writer.size_bytes, finished)
@@ -129,7 +144,7 @@ class StreamWriter:
         os.fsync(target.file.fileno())
         target.file.close()
         self._open_file = None
-        self._catalog.add(CatalogEntry(self._state(target, finished=True), (), ()))
+        self._add(CatalogEntry(self._state(target, finished=True), (), ()), target)
 
     def _abandon(self) -> None:
         """After a failure: what is not durable cut off, as far as the disk lets us, and the stream let go."""
@@ -148,7 +163,7 @@ def _locked(folder: Path) -> FileIO:
     except OSError as error:
         raise AppendFailed(f"stream {folder.name}: {error}") from error
     try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        _take_lock(lock)
         lock.truncate(0)
         lock.write(str(os.getpid()).encode())
     except BlockingIOError as error:
@@ -160,6 +175,17 @@ def _locked(folder: Path) -> FileIO:
         lock.close()
         raise AppendFailed(f"stream {folder.name}: not locked: {error}") from error
     return lock
+
+
+def _take_lock(lock: FileIO) -> None:
+    for tries_left in reversed(range(LOCK_TRIES)):
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return
+        except BlockingIOError:
+            if not tries_left:
+                raise
+            time.sleep(LOCK_PAUSE_S)
 
 
 def _sync_folder(folder: Path) -> None:
