@@ -91,7 +91,7 @@ def _array(values: Sequence[float], shape: tuple[int, ...]) -> Floats:
     """The numbers as an array. Raises EventRejected if there are not as many as the shape asks for."""
     if len(values) != math.prod(shape):
         raise EventRejected("undecodable", f"{len(values)} numbers, expected {math.prod(shape)} of shape {shape}")
-    return np.array(values, dtype=np.float64).reshape(shape)
+    return np.array(values[:], dtype=np.float64).reshape(shape)  # of a list: six times faster than of Protobuf's
 
 
 def _fix_message(event: GnssFixReceived) -> LocationFix:
