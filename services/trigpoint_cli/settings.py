@@ -28,10 +28,12 @@ from trigpoint.observability.log_lines import Secrets
 from trigpoint_filtering.settings import FilterSettings
 from trigpoint_ingest.settings import IngestSettings
 from trigpoint_optimisation.settings import SolveSettings
+from trigpoint_vehicle.settings import VehicleSettings
 
 ROUTER_ENDPOINT = "tcp/127.0.0.1:7447"
 ROUTER = RouterSettings(listen=(ROUTER_ENDPOINT,))
 CLIENT_OF_ROUTER = ZenohSettings(mode="client", connect=(ROUTER_ENDPOINT,), connect_timeout_s=10.0)
+ROOT_OF_FLEET = SetElsewhere((("root", "fleet.root"),))
 NAMES_OF_FLEET = SetElsewhere((("root", "fleet.root"), ("map_name", "fleet.map")))
 
 
@@ -45,6 +47,7 @@ class Settings:
     ingest: Annotated[IngestSettings, NAMES_OF_FLEET] = field(default_factory=IngestSettings)
     filtering: FilterSettings = field(default_factory=FilterSettings)
     optimisation: SolveSettings = field(default_factory=SolveSettings)
+    vehicle: Annotated[VehicleSettings, ROOT_OF_FLEET] = field(default_factory=VehicleSettings)
     router: RouterSettings = field(default_factory=lambda: ROUTER)
     up: UpSettings = field(default_factory=UpSettings)
     serve: ServeSettings = field(default_factory=ServeSettings)
