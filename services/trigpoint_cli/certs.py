@@ -68,7 +68,7 @@ def issue(name: str, role: str, folder: Path, passphrase_file: Path | None, *, s
         **wanted,
     )
     files = {"certificate_file": str(issued.certificate_file), "key_file": str(issued.key_file)}
-    lines = (f"{name} is a {role} until {_day(issued.row.not_after_s)}", *files.values())
+    lines = (f"{name}: {role}, until {_day(issued.row.not_after_s)}", *files.values())
     return Answer({**_values(issued.row), **files}, lines)
 
 

@@ -21,7 +21,7 @@ _LINE = re.compile(
     rb"^\S+ +(?P<level>[A-Z]+) +(?:[\w-]+ +)?ThreadId\((?P<thread>\d+)\) (?P<target>[\w:]+): (?P<text>.*)$"
 )
 _VERDICT = re.compile(
-    rb"(?:Using cached result: )?(?P<session>[0-9a-f]+) (?:on (?P<subject>\S+) )?is (?P<verdict>un)?authorized to "
+    rb"(?:Using cached result: )?(?P<session>[0-9a-f]+) (?:on (?P<subject>.*?) )?is (?P<verdict>un)?authorized to "
     rb"(?P<action>.*) \((?P<flow>ingress|egress)\) on (?P<key>.*)$"
 )
 _COMMON_NAME = re.compile(rb"CertCommonName\(([^)]*)\)")

@@ -1,0 +1,1 @@
+"""A fleet whose bus shows certificates: an authority, a router of its own process, and sessions of anyone."""
