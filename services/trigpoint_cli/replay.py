@@ -14,8 +14,12 @@ LISTED = 20  # differences said in full
 @answering
 def command(data: DataDirectory, *, screen: Screen) -> Answer:
     """Rebuild every projection from the log and say whether anything differs (then status 2)."""
-    with data.opened_log() as log, data.opened_database(read_only=True), screen.part_of("replaying") as progress:
-        found = replay_difference(log, data.database, progress=progress)
+    with (
+        data.opened_log() as log,
+        data.opened_database(read_only=True) as held,
+        screen.part_of("replaying") as progress,
+    ):
+        found = replay_difference(log, held, progress=progress)
     said = [{"table": one.table, "key": one.key, "detail": one.detail} for one in found[:LISTED]]
     complaints = tuple(f"{one['table']} {one['key']}: {one['detail']}" for one in said)
     return Answer({"differences": len(found), "listed": said}, ("no difference",) if not found else (), complaints)

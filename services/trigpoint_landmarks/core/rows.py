@@ -45,25 +45,30 @@ def labels_within(
 def map_change(version: SolvedVersion, *, frame: MapFrame, labels: Labels, valid: Mapping[str, Landmark]) -> MapChange:
     """What a version changes in a map whose valid landmarks are `valid`, by id.
 
-    A landmark solved exactly as before keeps its row; any other is closed, and opened anew if it is still there.
+    A landmark solved exactly as before keeps its row; any other is closed, and opened anew if it is still there. Of a
+    version that is a change of the one before, landmarks it does not name keep theirs too.
     """
-    solved = {row.landmark: row for row in landmark_rows(version.landmarks, frame)}
+    removed = frozenset(version.solved.removed) if version.solved.base_version else frozenset()
+    named = [row for row in version.landmarks if row.landmark not in removed]
+    solved = {row.landmark: row for row in landmark_rows(named, frame)}
     kept = {name for name, row in solved.items() if name in valid and _is_same(valid[name], row)}
+    gone: Iterable[str] = (*solved, *removed) if version.solved.base_version else valid
     return MapChange(
         version=_version_row(version, frame),
         opened=tuple(row for name, row in solved.items() if name not in kept),
-        closed=tuple(name for name in valid if name not in kept),
+        closed=tuple(name for name in gone if name in valid and name not in kept),
         trajectories=tuple(_trajectory_row(row, frame) for row in version.trajectories),
         anchors=tuple(_anchor_row(row, _label_of(row, labels), frame) for row in version.anchors),
         image_offsets=tuple(_offset_row(row) for row in version.image_offsets),
     )
 
 
-def valid_after(valid: Mapping[str, Landmark], change: MapChange) -> dict[str, Landmark]:
-    """The valid landmarks, by id, once a change is made."""
-    closed = frozenset(change.closed)
-    left = {name: row for name, row in valid.items() if name not in closed}
-    return left | {row.landmark: row for row in change.opened}
+def make_valid(valid: dict[str, Landmark], change: MapChange) -> None:
+    """`valid`, the valid landmarks by id, as they are once the change is made: in place, for there are many."""
+    for name in change.closed:
+        del valid[name]
+    for row in change.opened:
+        valid[row.landmark] = row
 
 
 def landmark_rows(landmarks: Sequence[LandmarkSolved], frame: MapFrame) -> list[Landmark]:
@@ -71,18 +76,21 @@ def landmark_rows(landmarks: Sequence[LandmarkSolved], frame: MapFrame) -> list[
     if not landmarks:
         return []
     points_m = np.array([row.position_m for row in landmarks], dtype=np.float64).reshape(-1, 2)
-    ellipses = ellipses_of(np.array([row.covariance_m2 for row in landmarks], dtype=np.float64).reshape(-1, 2, 2))
+    covariances_m2 = np.array([row.covariance_m2 for row in landmarks], dtype=np.float64).reshape(-1, 2, 2)
     lat_deg, lon_deg = wgs84_from_map_points(points_m, frame)
-    placed = np.column_stack([points_m, lat_deg, lon_deg, ellipses]).tolist()
+    variances_m2 = covariances_m2.reshape(-1, 4)[:, [0, 1, 3]]
+    placed = np.column_stack([points_m, lat_deg, lon_deg, ellipses_of(covariances_m2), variances_m2]).tolist()
     return [_landmark_row(row, place, frame) for row, place in zip(landmarks, placed, strict=True)]
 
 
 def _is_same(held: Landmark, solved: Landmark) -> bool:
+    if held.x_m != solved.x_m or held.y_m != solved.y_m:
+        return False  # hardly ever are all others compared
     return replace(solved, valid_from_version=held.valid_from_version) == held
 
 
 def _landmark_row(row: LandmarkSolved, place: list[float], frame: MapFrame) -> Landmark:
-    x_m, y_m, lat_deg, lon_deg, sigma_major_m, sigma_minor_m, ellipse_heading_rad = place
+    x_m, y_m, lat_deg, lon_deg, sigma_major_m, sigma_minor_m, ellipse_heading_rad, *variances_m2 = place
     return Landmark(
         landmark=row.landmark,
         kind=row.kind,
@@ -93,9 +101,9 @@ def _landmark_row(row: LandmarkSolved, place: list[float], frame: MapFrame) -> L
         northing_m=y_m + frame.origin_northing_m,
         lat_deg=lat_deg,
         lon_deg=lon_deg,
-        variance_x_m2=float(row.covariance_m2[0, 0]),
-        covariance_xy_m2=float(row.covariance_m2[0, 1]),
-        variance_y_m2=float(row.covariance_m2[1, 1]),
+        variance_x_m2=variances_m2[0],
+        covariance_xy_m2=variances_m2[1],
+        variance_y_m2=variances_m2[2],
         sigma_major_m=sigma_major_m,
         sigma_minor_m=sigma_minor_m,
         ellipse_heading_rad=ellipse_heading_rad,

@@ -1,6 +1,6 @@
 """Whole map versions out of the optimiser's events: what is not closed by its MapSolved is not there."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -33,37 +33,65 @@ class SolvedVersion:
     image_offsets: tuple[ImageOffsetSolved, ...]
 
 
-def solved_versions(rows: Iterable[Logged]) -> Iterator[SolvedVersion]:
-    """The versions closed in a stream of events in order of the log.
+class OpenVersion:
+    """The events since the last MapSolved: those of a version that is not closed yet.
 
     A version is made of the events of its number from the same boot of the writer as its MapSolved. Events before
     a MapSolved that are not its own belong to a solve that was cut off, and are dropped. What a writer says twice
     counts once, as it said it last.
     """
-    pending: list[Envelope[Mapped]] = []
-    for position, envelope in rows:
-        if isinstance(envelope.event, MapSolved):
-            yield _closed(position, envelope, envelope.event, pending)
-            pending = []
-        else:
-            pending.append(envelope)
+
+    def __init__(self) -> None:
+        self._pending: list[Envelope[Mapped]] = []
+
+    def after(self, position: LogPosition, envelope: Envelope[Mapped]) -> SolvedVersion | None:
+        """The version the next event of the log closes, None if it closes none."""
+        if not isinstance(envelope.event, MapSolved):
+            self._pending.append(envelope)
+            return None
+        pending, self._pending = self._pending, []
+        return _closed(position, envelope, envelope.event, pending)
 
 
-def refusal_of(version: SolvedVersion, *, newest: int) -> str:
-    """Why a version cannot be taken in after version `newest`, or an empty text."""
+def solved_versions(rows: Iterable[Logged]) -> Iterator[SolvedVersion]:
+    """The versions closed in a stream of events in order of the log."""
+    version = OpenVersion()
+    closed = (version.after(position, envelope) for position, envelope in rows)
+    return (one for one in closed if one is not None)
+
+
+def refusal_of(version: SolvedVersion, *, newest: int, valid: Collection[str]) -> str:
+    """Why a version cannot be taken in after version `newest`, whose landmarks are `valid`, or an empty text."""
     solved = version.solved
     if solved.map_version <= newest:
         return f"map version {solved.map_version} does not come after {newest}"
-    if solved.landmark_count != len(version.landmarks):
-        return f"MapSolved counts {solved.landmark_count} landmarks: {len(version.landmarks)} are in the log"
-    broken = [row.landmark for row in version.landmarks if not _is_finite(row)]
-    if broken:
-        return f"landmark {broken[0]!r} has a position or covariance that is not finite"
-    return ""
+    if solved.base_version not in (0, newest):
+        return f"map version {solved.map_version} is a change of {solved.base_version}: {newest} is held"
+    if solved.base_version:
+        unknown = [name for name in solved.removed if name not in valid]
+        if unknown:
+            return f"landmark {unknown[0]!r} is removed and not in map version {newest}"
+    count = landmark_count(version, valid)
+    if solved.landmark_count != count:
+        return f"MapSolved counts {solved.landmark_count} landmarks: {count} are in the log"
+    return _infinity_of(version.landmarks)
 
 
-def _is_finite(row: LandmarkSolved) -> bool:
-    return bool(np.isfinite(row.position_m).all() and np.isfinite(row.covariance_m2).all())
+def landmark_count(version: SolvedVersion, valid: Collection[str]) -> int:
+    """How many landmarks the map has with this version, where the version before has `valid`."""
+    if not version.solved.base_version:
+        return len(version.landmarks)
+    removed = set(version.solved.removed)
+    added = sum(row.landmark not in valid for row in version.landmarks if row.landmark not in removed)
+    return len(valid) + added - len(removed)
+
+
+def _infinity_of(landmarks: Sequence[LandmarkSolved]) -> str:
+    values = np.array([(*row.position_m.flat, *row.covariance_m2.flat) for row in landmarks], dtype=np.float64)
+    finite = np.isfinite(values).all(axis=-1) if len(values) else np.empty(0)
+    if finite.all():
+        return ""
+    return f"landmark {landmarks[int(np.argmin(finite))].landmark!r} has a position or covariance that is not finite"
 
 
 def _closed(

@@ -64,6 +64,11 @@ class MemoryStore:
             held = tuple(landmark for landmark in held + self._ended if valid_at(landmark, query.as_of))
         return answered([row for row in held if query.kind in (None, row.kind)], query)
 
+    def history(self, landmark: str) -> tuple[Landmark, ...]:
+        """Every row a landmark has had, in order of version."""
+        found = [row for row in (*self._ended, *self._valid.values()) if row.landmark == landmark]
+        return tuple(sorted(found, key=lambda row: row.valid_from_version))
+
     def changes(self, query: LandmarkQuery, *, since: int) -> LandmarkChanges:
         """What changed since a version among the landmarks that meet a query."""
         return changes_of(self, query, since=since)
@@ -82,6 +87,10 @@ class MemoryStore:
         yield from self._valid.values()
         yield from self._ended
         yield from self._others
+
+    def damage(self) -> tuple[str, ...]:
+        """Nothing: what is there is what was applied."""
+        return ()
 
     def close(self) -> None:
         """Nothing is held open."""

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -182,10 +183,16 @@ class LandmarkChanges:
 
 def provenance_json(observations: Sequence[tuple[str, str, int]]) -> str:
     """The text a landmark keeps of its observations: (vehicle, boot, sequence of the sweep) each."""
-    by_drive: dict[str, list[int]] = {}
+    by_drive: dict[tuple[str, str], list[int]] = {}
     for vehicle, boot_id, sequence in observations:
-        by_drive.setdefault(f"{vehicle}/{boot_id}", []).append(sequence)
-    return json.dumps(by_drive, ensure_ascii=False)
+        by_drive.setdefault((vehicle, boot_id), []).append(sequence)
+    # A list of whole numbers reads the same in JSON as in Python; there are too many of these for an encoder.
+    return "{" + ", ".join(f"{_drive_json(drive)}: {sequences}" for drive, sequences in by_drive.items()) + "}"
+
+
+@lru_cache(maxsize=4096)
+def _drive_json(drive: tuple[str, str]) -> str:
+    return json.dumps("/".join(drive), ensure_ascii=False)
 
 
 def valid_at(landmark: Landmark, map_version: int) -> bool:

@@ -33,6 +33,9 @@ class LandmarkStore(Protocol):
     def landmarks(self, query: LandmarkQuery) -> tuple[Landmark, ...]:
         """The landmarks that meet a query; none while no version is there. Raises InputError for an unknown version."""
 
+    def history(self, landmark: str) -> tuple[Landmark, ...]:
+        """Every row a landmark has had, in order of version; none for an id the map never had."""
+
     def changes(self, query: LandmarkQuery, *, since: int) -> LandmarkChanges:
         """What changed between version `since` and the query's, among the landmarks that meet the query.
 
@@ -48,6 +51,9 @@ class LandmarkStore(Protocol):
 
     def rows(self) -> Iterator[MapRow]:
         """Every row of every version, in no particular order: what two stores are compared by."""
+
+    def damage(self) -> tuple[str, ...]:
+        """What is wrong with the store's own files and indexes, as far as it can tell; nothing for a sound one."""
 
     def close(self) -> None:
         """Nothing more is held open."""

@@ -89,6 +89,17 @@ class PostgisStore:
         with self._session.transaction() as connection:
             return _answered(connection, query)
 
+    def history(self, landmark: str) -> tuple[Landmark, ...]:
+        """Every row a landmark has had, in order of version."""
+        with self._session.transaction() as connection:
+            versions = _versions(connection)
+            found = []
+            for source in LANDMARK_TABLES if versions else ():
+                everything = landmark_statement(source, LandmarkQuery(), version=versions[0], older=False)
+                own = connection.execute(everything.where(source.c.landmark == landmark))
+                found += [found_landmark(row) for row in own]
+        return tuple(sorted(found, key=lambda row: row.valid_from_version))
+
     def changes(self, query: LandmarkQuery, *, since: int) -> LandmarkChanges:
         """What changed since a version among the landmarks that meet a query."""
         with self._session.transaction() as connection:
@@ -116,6 +127,10 @@ class PostgisStore:
             yield from map(records.trajectory_of, _records(connection, tables.trajectories))
             yield from map(records.anchor_of, _records(connection, tables.anchors))
             yield from map(records.image_offset_of, _records(connection, tables.image_offsets))
+
+    def damage(self) -> tuple[str, ...]:
+        """Nothing: a server checks its pages itself."""
+        return ()
 
     def close(self) -> None:
         """The connection ended."""

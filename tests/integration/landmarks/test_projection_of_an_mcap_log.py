@@ -35,7 +35,9 @@ def test_a_database_built_step_by_step_is_what_the_log_on_disk_replays(tmp_path:
     build_in_steps(log, tmp_path / "landmarks.gpkg")
     log.close()
     reopened = McapLog(tmp_path / "log")
-    assert replay_difference(reopened, tmp_path / "landmarks.gpkg") == ()
+    held = GeoPackageStore(tmp_path / "landmarks.gpkg", read_only=True)
+    assert replay_difference(reopened, held) == ()
+    held.close()
     reopened.close()
 
 

@@ -23,8 +23,8 @@ from landmark_maps.examples import (
 from trigpoint.events.corrected import AnchorRetracted, Corrected
 from trigpoint.events.envelope import Envelope, EventIdentity, LogPosition
 from trigpoint.events.mapped import LandmarkSolved, Mapped
-from trigpoint.landmarks.model import MapChange
-from trigpoint_landmarks.core.rows import labels_within, map_change, valid_after
+from trigpoint.landmarks.model import Landmark, MapChange
+from trigpoint_landmarks.core.rows import labels_within, make_valid, map_change
 from trigpoint_landmarks.core.versions import solved_versions
 
 
@@ -35,7 +35,15 @@ def changed(map_version: int, landmarks: list[LandmarkSolved], held: MapChange |
         for number, event in enumerate(solved_map(map_version, landmarks))
     ]
     (version,) = solved_versions(rows)
-    return map_change(version, frame=frame(), labels={}, valid=valid_after({}, held) if held else {})
+    return map_change(version, frame=frame(), labels={}, valid=valid_with(held) if held else {})
+
+
+def valid_with(*changes: MapChange) -> dict[str, Landmark]:
+    """The valid landmarks once the changes are made."""
+    valid: dict[str, Landmark] = {}
+    for change in changes:
+        make_valid(valid, change)
+    return valid
 
 
 def test_a_landmark_stands_at_its_grid_position() -> None:
@@ -83,7 +91,7 @@ def test_a_landmark_moved_by_the_least_bit_gets_a_new_row() -> None:
 def test_a_landmark_no_longer_solved_is_closed() -> None:
     first = changed(1, [solved_landmark("L1", 0.0, 0.0), solved_landmark("L2", 9.0, 0.0)])
     gone = changed(2, [solved_landmark("L2", 9.0, 0.0, map_version=2)], first)
-    assert (gone.opened, gone.closed, list(valid_after(valid_after({}, first), gone))) == ((), ("L1",), ["L2"])
+    assert (gone.opened, gone.closed, list(valid_with(first, gone))) == ((), ("L1",), ["L2"])
 
 
 def test_a_trajectory_is_a_line_on_the_grid_with_its_length() -> None:

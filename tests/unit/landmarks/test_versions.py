@@ -56,23 +56,23 @@ def test_events_of_another_version_number_are_left_out() -> None:
 
 def test_a_version_with_a_landmark_too_few_is_refused_with_both_counts() -> None:
     (version,) = versions(logged([solved_landmark("L1", 0.0, 0.0), closing(1, 2)]))
-    assert refusal_of(version, newest=0) == "MapSolved counts 2 landmarks: 1 are in the log"
+    assert refusal_of(version, newest=0, valid=()) == "MapSolved counts 2 landmarks: 1 are in the log"
 
 
 def test_a_version_not_after_the_newest_is_refused() -> None:
     (version,) = versions(logged(solved_map(4, [solved_landmark("L1", 0.0, 0.0, map_version=4)])))
-    assert refusal_of(version, newest=4) == "map version 4 does not come after 4"
-    assert refusal_of(version, newest=3) == ""
+    assert refusal_of(version, newest=4, valid=()) == "map version 4 does not come after 4"
+    assert refusal_of(version, newest=3, valid=()) == ""
 
 
 def test_a_landmark_at_no_finite_place_refuses_its_version() -> None:
     (version,) = versions(logged(solved_map(1, [solved_landmark("L1", float("nan"), 0.0)])))
-    assert refusal_of(version, newest=0) == "landmark 'L1' has a position or covariance that is not finite"
+    assert refusal_of(version, newest=0, valid=()) == "landmark 'L1' has a position or covariance that is not finite"
 
 
 def test_an_empty_map_is_a_version() -> None:
     (version,) = versions(logged([closing(1, 0)]))
-    assert (names(version), refusal_of(version, newest=0)) == ([], "")
+    assert (names(version), refusal_of(version, newest=0, valid=())) == ([], "")
 
 
 def test_arrays_are_taken_as_they_are() -> None:
