@@ -246,3 +246,20 @@ def test_trajectories_anchors_and_offsets_come_back_exactly(store: LandmarkStore
     store.apply(whole, checkpoint(1))
     expected = {whole.version, *whole.opened, *whole.trajectories, *whole.anchors, *whole.image_offsets}
     assert set(store.rows()) == expected
+
+
+def test_a_landmark_s_history_is_every_row_it_has_had(moved: LandmarkStore) -> None:
+    rows = moved.history("B")
+    assert [(row.x_m, row.valid_from_version, row.valid_to_version) for row in rows] == [
+        (100.0, 1, 2),
+        (101.0, 2, None),
+    ]
+    assert [(row.valid_from_version, row.valid_to_version) for row in moved.history("A")] == [(1, 3)]
+
+
+def test_a_landmark_the_map_never_had_has_no_history(moved: LandmarkStore) -> None:
+    assert moved.history("Z") == ()
+
+
+def test_an_empty_store_has_no_history(store: LandmarkStore) -> None:
+    assert store.history("A") == ()
