@@ -2,6 +2,7 @@
 
 import os
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -27,6 +28,11 @@ class FileBytes:
     def read(self, start: int, stop: int) -> bytes:
         """The bytes of [start, stop), fewer where the file ends before."""
         return os.pread(self._file.fileno(), max(stop - start, 0), start)
+
+    def blocks(self) -> Iterator[bytes]:
+        """All bytes in order, some at a time."""
+        for start in range(0, self.size_bytes, BLOCK_BYTES):
+            yield self.read(start, min(start + BLOCK_BYTES, self.size_bytes))
 
     def find(self, wanted: bytes, start: int) -> int:
         """The first position of `wanted` from `start` on, -1 if there is none."""

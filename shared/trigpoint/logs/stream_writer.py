@@ -11,6 +11,7 @@ from io import FileIO
 from pathlib import Path
 
 from trigpoint.errors import AppendFailed
+from trigpoint.logs.absences import recorded_absences, sync_folder
 from trigpoint.logs.catalog import Catalog, CatalogChunk, CatalogEntry, CatalogFile, CatalogRenewed, renewed_once
 from trigpoint.logs.channels import PackedRows
 from trigpoint.logs.log_files import LOCK_NAME, bring_up_to_date, entry_of, file_path, mend
@@ -19,16 +20,19 @@ from trigpoint.logs.mcap_writer import CHANNEL_LIMIT, McapFileWriter, WrittenChu
 LOCK_TRIES, LOCK_PAUSE_S = 25, 0.01  # a reader that asks whether there is a writer has the lock for microseconds
 FILE_BYTES = 64 * 1024 * 1024  # small enough to copy and to rescan in about a second
 FILE_SPAN_NS = 3_600_000_000_000  # an hour of measurements
+FILE_AGE_NS = 24 * FILE_SPAN_NS  # a day: a quiet stream's events are sealed and can be backed up at last
 SPAN_LEAST_BYTES = 1024 * 1024  # drives of different years in one stream must not make a file an append
 
 
 @dataclass(frozen=True, slots=True)
 class Rotation:
-    """When a file is long enough: by its bytes, or, from `span_least_bytes` on, by the time its measurements span."""
+    """When a file is long enough: by its bytes, or, from `span_least_bytes` on, by the time its measurements span, or,
+    where somebody asks, by how long it was open."""
 
     size_bytes: int = FILE_BYTES
     span_ns: int = FILE_SPAN_NS
     span_least_bytes: int = SPAN_LEAST_BYTES
+    age_ns: int = FILE_AGE_NS
 
 
 @dataclass(slots=True)
@@ -42,6 +46,7 @@ class _OpenFile:
     end_ns: int
     channels_known: int = 0
     durable_bytes: int = 0  # and entered in the catalog
+    seen_ns: int | None = None  # when its age was first asked for
 
 
 class StreamWriter:
@@ -68,7 +73,8 @@ class StreamWriter:
         """The next number, after all files were read and mended."""
         bring_up_to_date(self._catalog, self._folder, self._folder.name, alone=True)
         mend(self._catalog, self._folder, self._folder.name)
-        return self._catalog.next_number(self._folder.name)
+        absent = max((absence.stop_number for absence in recorded_absences(self._folder)), default=0)
+        return max(self._catalog.next_number(self._folder.name), absent)
 
     def append(self, rows: PackedRows, metadata: Mapping[str, Mapping[str, str]]) -> None:
         """The rows durable. Raises AppendFailed and lets the stream go; nothing of them counts as appended then,
@@ -89,6 +95,25 @@ class StreamWriter:
             self._abandon()
             raise
 
+    def end_aged(self, now_ns: int) -> bool:
+        """Whether the file was ended, because it was open for the rotation's age; its age counts from the first look.
+
+        Raises AppendFailed and lets the stream go if it cannot be ended.
+        """
+        target = self._open_file
+        if target is None:
+            return False
+        if target.seen_ns is None:
+            target.seen_ns = now_ns
+        if now_ns - target.seen_ns < self._rotation.age_ns:
+            return False
+        try:
+            self._end(target)
+        except (OSError, sqlite3.Error) as error:
+            self._abandon()
+            raise AppendFailed(f"stream {self._folder.name}: file not ended: {error}") from error
+        return True
+
     def close(self) -> None:
         """The file ended with its summary, the stream let go. Raises AppendFailed if that cannot be written."""
         try:
@@ -105,8 +130,8 @@ class StreamWriter:
         self._open_file = _OpenFile(self.next_number, file, writer, stamp_ns, stamp_ns)
         begun = CatalogFile(self._folder.name, self.next_number, 0, finished=False)
         renewed_once(lambda: self._catalog.replace(CatalogEntry(begun, (), ())))
-        _sync_folder(self._folder)
-        _sync_folder(self._folder.parent)
+        sync_folder(self._folder)
+        sync_folder(self._folder.parent)
         return self._open_file
 
     def _enter(self, target: _OpenFile, chunks: Sequence[WrittenChunk]) -> None:
@@ -186,12 +211,3 @@ def _take_lock(lock: FileIO) -> None:
             if not tries_left:
                 raise
             time.sleep(LOCK_PAUSE_S)
-
-
-def _sync_folder(folder: Path) -> None:
-    """A new name in the folder made durable."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
