@@ -5,9 +5,14 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from trigpoint.bus.ports import Bus, BusMessage, Subscription
+import numpy as np
+
+from trigpoint.bus.ports import Bus, BusRun, Subscription
+from trigpoint.events.codec import schema_version
 from trigpoint.events.envelope import EventIdentity
+from trigpoint.events.runs import EncodedRun
 from trigpoint.events.uplink import acknowledgement_key, uplink_key
+from trigpoint_vehicle.core.outgoing import Outgoing, SendChannel
 from trigpoint_vehicle.core.patience import Patience, after_progress, after_sending, after_silence, patience
 from trigpoint_vehicle.core.under_way import UnderWay
 from trigpoint_vehicle.settings import VehicleSettings
@@ -15,13 +20,15 @@ from trigpoint_vehicle.settings import VehicleSettings
 LOOK_S = 0.05  # between two looks whether anybody listens
 TRUSTED_S = 5.0  # so long after an acknowledgement somebody listens, whatever the bus knows of it
 
+UNKNOWN_VERSION = 1  # of a schema nobody here knows: its bytes go as they are
+
 logger = logging.getLogger(__name__)
 
 
 class Source(Protocol):
     """Where messages come from, and where it is told that they need not be kept."""
 
-    def read(self, *, count: int, size_bytes: int) -> Sequence[BusMessage]:
+    def read(self, *, count: int, size_bytes: int) -> Sequence[Outgoing]:
         """The next messages in order, at most `count`, and as many until `size_bytes` are reached; none for now."""
 
     def released(self, count: int) -> None:
@@ -45,7 +52,7 @@ class Forwarder:
         self._vehicle = vehicle
         self._bus: Bus | None = None
         self._acknowledgements: Subscription | None = None
-        self._under_way: UnderWay[BusMessage] = UnderWay(limit=settings.window_count, limit_bytes=settings.window_bytes)
+        self._under_way: UnderWay = UnderWay(limit=settings.window_count, limit_bytes=settings.window_bytes)
         self._patience: Patience = patience(first_s=settings.ack_timeout_s, longest_s=settings.ack_timeout_max_s)
         self._heard_s = self._looked_s = -float("inf")
         self._is_heard = False
@@ -75,7 +82,8 @@ class Forwarder:
     @property
     def oldest(self) -> EventIdentity:
         """Whose acknowledgement is awaited. Raises IndexError if nothing is."""
-        return self._under_way.oldest.identity
+        oldest = self._under_way.oldest
+        return EventIdentity(oldest.channel.source, oldest.channel.boot_id, oldest.sequence)
 
     def silent_s(self) -> float:
         """How long something was awaited in vain."""
@@ -158,7 +166,24 @@ class Forwarder:
     def _send(self, bus: Bus) -> None:
         settings = self._settings
         messages = self._under_way.to_send(count=settings.together_count, size_bytes=settings.together_bytes)
+        groups: dict[SendChannel, list[Outgoing]] = {}
+        for message in messages:
+            groups.setdefault(message.channel, []).append(message)
+        for channel, group in groups.items():
+            bus.publish_run(_run(channel, group))
         if messages:
-            bus.publish_all(messages)
             self.sent += len(messages)
             self._patience = after_sending(self._patience, now_s=self._now_s())
+
+
+def _run(channel: SendChannel, messages: Sequence[Outgoing]) -> BusRun:
+    run = EncodedRun(
+        source=channel.source,
+        boot_id=channel.boot_id,
+        schemas=(channel.schema_name,),
+        schema_of_row=np.zeros(len(messages), dtype=np.int64),
+        sequences=np.array([message.sequence for message in messages], dtype=np.int64),
+        stamps_ns=np.array([message.stamp_ns for message in messages], dtype=np.int64),
+        payloads=[message.payload for message in messages],
+    )
+    return BusRun(channel.key, schema_version(channel.schema_name) or UNKNOWN_VERSION, run)

@@ -95,7 +95,7 @@ class VehiclePublisher:
         self._drained = threading.Condition()
         self._wake = threading.Event()
         self._stop = threading.Event()
-        self._channels: dict[str, SpoolChannel] = {}
+        self._channels: dict[tuple[str, str], SpoolChannel] = {}
         self._next_sequence = 0
         self._failure: Exception | None = None
         self._thread = threading.Thread(target=self._run, name=f"publisher of {vehicle}", daemon=True)
@@ -124,15 +124,12 @@ class VehiclePublisher:
             raise InputError(f"{type(event).__name__} is not what a vehicle sends")
         schema_name, payload = encode(event)
         self._require(payload)
-        channel = self._channels.get(schema_name)
-        if channel is None:
-            channel = self._channels[schema_name] = SpoolChannel(self.vehicle, self.boot_id, schema_name, True)
+        channel = self._channel(self.boot_id, schema_name)
         with self._mutex:
             sequence = self._next_sequence
             self._spool.append(channel, sequence, stamp_ns, payload)
             self._next_sequence = sequence + 1
-        if not self._wake.is_set():
-            self._wake.set()
+        self._wake_up()
         return EventIdentity(self.vehicle, self.boot_id, sequence)
 
     def forward(self, message: RecordedMessage) -> None:
@@ -144,10 +141,21 @@ class VehiclePublisher:
         if identity.source != self.vehicle:
             raise InputError(f"{identity} is not of vehicle {self.vehicle!r}")
         self._require(message.payload)
-        channel = SpoolChannel(identity.source, identity.boot_id, message.schema_name, False)
+        channel = self._channel(identity.boot_id, message.schema_name)
         with self._mutex:
             self._spool.append(channel, identity.sequence, message.stamp_ns, message.payload)
-        self._wake.set()
+        self._wake_up()
+
+    def _channel(self, boot_id: str, schema_name: str) -> SpoolChannel:
+        found = self._channels.get((boot_id, schema_name))
+        if found is None:
+            found = SpoolChannel(self.vehicle, boot_id, schema_name, numbered=boot_id == self.boot_id)
+            self._channels[boot_id, schema_name] = found
+        return found
+
+    def _wake_up(self) -> None:
+        if not self._wake.is_set():
+            self._wake.set()
 
     def _require(self, payload: bytes) -> None:
         if self._failure is not None:

@@ -6,24 +6,24 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
-from trigpoint.bus.ports import BusMessage
 from trigpoint.errors import AppendFailed, InputError, ServiceError
+from trigpoint_vehicle.core.outgoing import Outgoing
 from trigpoint_vehicle.core.spool_records import (
     MESSAGE,
     SpoolChannel,
     channel_record,
     encode_record,
-    record_at,
     segment_record,
+    whole_records,
 )
 from trigpoint_vehicle.core.spool_walk import contents_of, without_data
 from trigpoint_vehicle.settings import VehicleSettings
-from trigpoint_vehicle.spool_reading import Spooled, SpoolReader, require_vehicle
+from trigpoint_vehicle.spool_reading import SpoolReader, require_vehicle
 from trigpoint_vehicle.spool_segments import (
     Segment,
     SegmentWriter,
@@ -65,10 +65,12 @@ class Spool:
         self._now_ns = now_ns
         self._mutex = threading.Lock()
         self._segments: list[Segment] = []
+        self._by_number: dict[int, Segment] = {}  # those begun to be read
         self._writer: SegmentWriter | None = None
         self._unsynced: list[SegmentWriter] = []
         self._channels: dict[SpoolChannel, int] = {}  # of the segment being written
-        self._read: deque[tuple[int, int, Segment, bool]] = deque()  # time, bytes, segment, is data
+        self._block: deque[Outgoing] = deque()  # read from a file and not yet asked for
+        self._read: deque[Outgoing] = deque()  # handed out and not released
         self._waiting = self._waiting_bytes = self._disk_bytes = 0
         self._oldest_ns = 0
         self._number = 0
@@ -80,7 +82,7 @@ class Spool:
             self._lock_file.close()
             raise
         self._reader = SpoolReader(self._following, root=settings.root)
-        self._messages: Iterator[Spooled | None] = self._reader.messages()
+        self._blocks = self._reader.messages()
 
     def _find_segments(self) -> None:
         for number, path in segment_paths(self._folder):
@@ -97,7 +99,8 @@ class Spool:
             aside = path.rename(path.with_suffix(DAMAGED_SUFFIX))
             logger.error("%s: no whole record in %d bytes, kept aside", aside, len(data))
             return
-        first = record_at(data, 0) if found.whole_bytes and not any(gap.start == 0 for gap in found.gaps) else None
+        records, _ = whole_records(data, 0, count=1)
+        first = records[0] if records else None
         if first is not None:
             require_vehicle(first, self._vehicle, path)
         if found.whole_bytes < len(data):
@@ -220,28 +223,31 @@ class Spool:
                 with self._mutex:
                     self._unsynced.remove(writer)
 
-    def read(self, *, count: int, size_bytes: int) -> list[BusMessage]:
+    def read(self, *, count: int, size_bytes: int) -> list[Outgoing]:
         """The next durable messages, at most `count`, and as many until `size_bytes` are reached.
 
         Raises OSError for a file that cannot be read.
         """
-        chosen: list[BusMessage] = []
-        taken: list[tuple[int, int, Segment, bool]] = []
-        while len(chosen) < count and size_bytes > 0:
-            spooled = next(self._messages)
-            if spooled is None:
-                break
-            message, spooled_ns, segment, is_data = spooled
-            size = len(message.payload)
-            size_bytes -= size
+        chosen: list[Outgoing] = []
+        while len(chosen) < count and size_bytes > 0 and self._has_block():
+            message = self._block.popleft()
+            segment = self._by_number[message.segment]
+            size_bytes -= len(message.payload)
             segment.waiting += 1
-            segment.taken += is_data
-            segment.taken_bytes += size
+            segment.taken += message.is_data
+            segment.taken_bytes += len(message.payload)
             chosen.append(message)
-            taken.append((spooled_ns, size, segment, is_data))
         with self._mutex:
-            self._read.extend(taken)
+            self._read.extend(chosen)
         return chosen
+
+    def _has_block(self) -> bool:
+        while not self._block:
+            block = next(self._blocks)
+            if block is None:
+                return False
+            self._block.extend(block)
+        return True
 
     def _following(self, done: Segment | None) -> Segment | None:
         """The segment to be read next, None while there is none."""
@@ -255,16 +261,18 @@ class Spool:
             following = next((segment for segment in self._segments if segment.number > number), None)
             if following is not None:
                 following.begun = True
+                self._by_number[following.number] = following
             return following
 
     def released(self, count: int) -> None:
         """The oldest `count` messages that were read are acknowledged; segments of which all are, are deleted."""
         with self._mutex:
             for _ in range(count):
-                spooled_ns, size, segment, is_data = self._read.popleft()
-                self._oldest_ns = spooled_ns or self._oldest_ns
-                self._waiting -= is_data
-                self._waiting_bytes -= size
+                message = self._read.popleft()
+                segment = self._by_number[message.segment]
+                self._oldest_ns = message.spooled_ns or self._oldest_ns
+                self._waiting -= message.is_data
+                self._waiting_bytes -= len(message.payload)
                 segment.waiting -= 1
                 if segment.read and not segment.waiting:
                     self._let_go(segment)
@@ -280,6 +288,7 @@ class Spool:
             return
         with contextlib.suppress(ValueError):  # let go before
             self._segments.remove(segment)
+            self._by_number.pop(segment.number, None)
             self._disk_bytes -= segment.size
             segment.path.unlink(missing_ok=True)
 
@@ -289,7 +298,7 @@ class Spool:
         with self._mutex:
             if not self._waiting:
                 return Behind(messages=0, bytes=0, oldest_s=0.0)
-            oldest_ns = self._read[0][0] if self._read and self._read[0][0] else self._oldest_ns
+            oldest_ns = (self._read[0].spooled_ns if self._read else 0) or self._oldest_ns
             age_s = max(self._now_ns() - oldest_ns, 0) / NS_PER_S
             return Behind(messages=self._waiting, bytes=self._waiting_bytes, oldest_s=age_s)
 
@@ -317,7 +326,7 @@ class Spool:
         try:
             self.sync()
         finally:
-            self._messages.close()  # type: ignore[attr-defined]  # a generator
+            self._blocks.close()
             self._delete_acknowledged()
             self._lock_file.close()
 

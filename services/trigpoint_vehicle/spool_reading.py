@@ -1,15 +1,13 @@
 """A spool's messages in the order they were spooled, read from its files as they become durable."""
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from io import FileIO
-from typing import NamedTuple
 
-from trigpoint.bus.ports import BusMessage
 from trigpoint.errors import InputError
 from trigpoint.events.codec import event_class
-from trigpoint.events.envelope import EventIdentity
 from trigpoint.events.uplink import DROPPED_SCHEMA, uplink_key
+from trigpoint_vehicle.core.outgoing import Outgoing, SendChannel
 from trigpoint_vehicle.core.spool_records import (
     CHANNEL,
     DROPPED,
@@ -20,27 +18,22 @@ from trigpoint_vehicle.core.spool_records import (
     channel_of,
     segment_of,
 )
-from trigpoint_vehicle.core.spool_walk import Gap, walk
+from trigpoint_vehicle.core.spool_walk import TOGETHER, Gap, walk
 from trigpoint_vehicle.spool_segments import Segment
 
 logger = logging.getLogger(__name__)
 
 
-class Spooled(NamedTuple):
-    """A message read back; a tuple, as there are many. `is_data` is False for one that stands for a dropped one."""
+def send_channel(source: str, boot_id: str, schema_name: str, *, root: str) -> SendChannel:
+    """Where a source's messages of a schema go, whether vehicles may send such or not: ingest says so.
 
-    message: BusMessage
-    spooled_ns: int
-    segment: Segment
-    is_data: bool
-
-
-def sending_key(vehicle: str, schema_name: str, *, root: str) -> str:
-    """The key a vehicle sends a schema's messages on, whether vehicles may send such or not: ingest says so."""
+    Raises InputError for a source that cannot be a vehicle's name.
+    """
     try:
-        return uplink_key(vehicle, event_class(schema_name), root=root)
+        key = uplink_key(source, event_class(schema_name), root=root)
     except InputError:
-        return uplink_key(vehicle, None, root=root)
+        key = uplink_key(source, None, root=root)
+    return SendChannel(source, boot_id, schema_name, key)
 
 
 class SpoolReader:
@@ -52,8 +45,8 @@ class SpoolReader:
         self._expected: dict[str, int] = {}  # the next sequence of each boot
         self.damaged_bytes = 0
 
-    def messages(self) -> Iterator[Spooled | None]:
-        """Every message, never ending. Raises OSError for a file that cannot be read."""
+    def messages(self) -> Generator[list[Outgoing] | None, None, None]:
+        """Every message, some at a time, never ending. Raises OSError for a file that cannot be read."""
         segment: Segment | None = None
         while True:
             following = self._following(segment)
@@ -63,47 +56,51 @@ class SpoolReader:
             segment = following
             yield from self._of_segment(segment)
 
-    def _of_segment(self, segment: Segment) -> Iterator[Spooled | None]:
-        channels: dict[int, tuple[SpoolChannel, str]] = {}
-        for record in self._records(segment):
-            if record is None:
+    def _of_segment(self, segment: Segment) -> Iterator[list[Outgoing] | None]:
+        channels: dict[int, tuple[SendChannel, bool]] = {}  # and whether its numbers leave no gaps
+        for records in self._records(segment):
+            if records is None:
                 yield None
-            elif record.kind == SEGMENT:
-                self._expected.setdefault(segment_of(record)[1], record.sequence)
-            elif record.kind == CHANNEL:
-                channel = channel_of(record)
-                channels[record.channel] = channel, sending_key(channel.source, channel.schema_name, root=self._root)
-            elif record.channel in channels:
-                yield from self._sent(segment, record, *channels[record.channel])
+                continue
+            messages: list[Outgoing] = []
+            for record in records:
+                if record.kind == MESSAGE and record.channel in channels:
+                    channel, is_numbered = channels[record.channel]
+                    expected = self._expected.get(channel.boot_id, record.sequence)
+                    if record.sequence > expected and (is_numbered or self.damaged_bytes):
+                        yield messages
+                        yield from self._gone(channel, expected, record.sequence - 1, segment)
+                        messages = []
+                    self._expected[channel.boot_id] = max(record.sequence + 1, expected)
+                    messages.append(_outgoing(channel, record, segment))
+                elif record.kind == DROPPED and record.channel in channels:
+                    channel, _ = channels[record.channel]
+                    yield messages
+                    yield from self._gone(channel, record.sequence, record.stamp_ns, segment)
+                    messages = []
+                    self._expected[channel.boot_id] = record.stamp_ns + 1
+                else:
+                    self._take_note(record, channels)
+            yield messages
 
-    def _sent(self, segment: Segment, record: Record, channel: SpoolChannel, key: str) -> Iterator[Spooled]:
-        sequence, boot_id = record.sequence, channel.boot_id
-        expected = self._expected.get(boot_id, sequence)
-        if sequence > expected and (channel.numbered or self.damaged_bytes):
-            yield from self._gone(segment, channel, expected, sequence - 1)
-        if record.kind == DROPPED:
-            yield from self._gone(segment, channel, sequence, record.stamp_ns)
-            sequence = record.stamp_ns
-        elif record.kind == MESSAGE:
-            identity = EventIdentity(channel.source, boot_id, sequence)
-            message = BusMessage(
-                key=key,
-                schema_name=channel.schema_name,
-                payload=record.body,
-                identity=identity,
-                stamp_ns=record.stamp_ns,
-            )
-            yield Spooled(message, record.spooled_ns, segment, True)
-        self._expected[boot_id] = max(sequence + 1, expected)
+    def _take_note(self, record: Record, channels: dict[int, tuple[SendChannel, bool]]) -> None:
+        if record.kind == SEGMENT:
+            self._expected.setdefault(segment_of(record)[1], record.sequence)
+        elif record.kind == CHANNEL:
+            spooled = channel_of(record)
+            channels[record.channel] = self._channel(spooled), spooled.numbered
 
-    def _gone(self, segment: Segment, channel: SpoolChannel, first: int, last: int) -> Iterator[Spooled]:
+    def _channel(self, spooled: SpoolChannel) -> SendChannel:
+        return send_channel(spooled.source, spooled.boot_id, spooled.schema_name, root=self._root)
+
+    def _gone(self, channel: SendChannel, first: int, last: int, segment: Segment) -> Iterator[list[Outgoing]]:
         key = uplink_key(channel.source, None, root=self._root)
-        for sequence in range(first, last + 1):
-            identity = EventIdentity(channel.source, channel.boot_id, sequence)
-            message = BusMessage(key=key, schema_name=DROPPED_SCHEMA, payload=b"", identity=identity, stamp_ns=0)
-            yield Spooled(message, 0, segment, False)
+        gone = SendChannel(channel.source, channel.boot_id, DROPPED_SCHEMA, key)
+        for start in range(first, last + 1, TOGETHER):
+            numbers = range(start, min(start + TOGETHER, last + 1))
+            yield [Outgoing(gone, number, 0, b"", segment=segment.number, is_data=False) for number in numbers]
 
-    def _records(self, segment: Segment) -> Iterator[Record | None]:
+    def _records(self, segment: Segment) -> Iterator[list[Record] | None]:
         """The segment's whole records, as far as they are durable; ends when it is sealed and read."""
         at = 0
         with segment.path.open("rb", buffering=0) as file:  # nothing is read ahead of what is durable
@@ -117,13 +114,17 @@ class SpoolReader:
                 else:
                     yield None
 
-    def _whole(self, segment: Segment, data: bytes, at: int) -> Iterator[Record]:
+    def _whole(self, segment: Segment, data: bytes, at: int) -> Iterator[list[Record]]:
         for part in walk(data):
             if isinstance(part, Gap):
                 self.damaged_bytes += part.end - part.start
                 logger.error("%s: bytes %d to %d are damaged", segment.path, at + part.start, at + part.end)
             else:
                 yield part
+
+
+def _outgoing(channel: SendChannel, record: Record, segment: Segment) -> Outgoing:
+    return Outgoing(channel, record.sequence, record.stamp_ns, record.body, record.spooled_ns, segment.number)
 
 
 def _bytes_of(file: FileIO, start: int, end: int) -> bytes:

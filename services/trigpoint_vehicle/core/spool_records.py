@@ -30,7 +30,7 @@ NUL = "\0"
 
 
 class Record(NamedTuple):
-    """A whole record, and where in its bytes the next one begins. A tuple, as some hundred thousand a second are."""
+    """A whole record; a tuple, as there are many a second."""
 
     kind: int
     channel: int
@@ -38,12 +38,14 @@ class Record(NamedTuple):
     stamp_ns: int
     spooled_ns: int
     body: bytes
-    end: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class SpoolChannel:
-    """What many messages have in common; `numbered` where the numbers leave no gaps of their own."""
+    """What many messages have in common; `numbered` where the numbers leave no gaps of their own.
+
+    Compared by identity, as that is done for every message.
+    """
 
     source: str
     boot_id: str
@@ -60,35 +62,28 @@ def encode_record(kind: int, channel: int, sequence: int, stamp_ns: int, spooled
     return _CRC.pack(zlib.crc32(body, zlib.crc32(fields))) + fields + body
 
 
-def record_at(data: bytes, at: int) -> Record | None:
-    """The record that begins there, or None if the data end inside of it. Raises LogDamaged if it is not whole."""
-    body_at = at + HEAD_BYTES
-    if body_at > len(data):
-        return None
-    crc, size, kind, mark, channel, sequence, stamp_ns, spooled_ns = _HEAD.unpack_from(data, at)
-    if mark != MARK or kind not in KINDS:
-        raise LogDamaged(f"byte {at}: no record begins here")
-    end = body_at + size
-    if end > len(data):
-        return None
-    body = data[body_at:end]
-    if zlib.crc32(body, zlib.crc32(data[at + _CRC.size : body_at])) != crc:
-        raise LogDamaged(f"byte {at}: the record's checksum does not fit its content")
-    return Record(kind, channel, sequence, stamp_ns, spooled_ns, body, end)
+def whole_records(data: bytes, at: int, *, count: int) -> tuple[list[Record], int]:
+    """Up to `count` whole records from there on, and where they end; fewer if the data end or are damaged there."""
+    records: list[Record] = []
+    view, length, unpack, crc32 = memoryview(data), len(data), _HEAD.unpack_from, zlib.crc32
+    while len(records) < count and at + HEAD_BYTES <= length:
+        crc, size, kind, mark, channel, sequence, stamp_ns, spooled_ns = unpack(data, at)
+        end = at + HEAD_BYTES + size
+        if mark != MARK or kind not in KINDS or end > length or crc32(view[at + _CRC.size : end]) != crc:
+            break
+        records.append(Record(kind, channel, sequence, stamp_ns, spooled_ns, data[at + HEAD_BYTES : end]))
+        at = end
+    return records, at
 
 
-def next_whole_record(data: bytes, after: int) -> int | None:
-    """Where the first whole record behind a damaged one begins; None if there is none."""
+def next_whole_record(data: bytes, after: int) -> int:
+    """Where the first whole record behind a damaged one begins; the end of the data if there is none."""
     mark_at = data.find(MARK, after + _MARK_AT + 1)
     while mark_at >= 0:
-        at = mark_at - _MARK_AT
-        try:
-            if record_at(data, at) is not None:
-                return at
-        except LogDamaged:
-            pass  # a mark inside of something else
+        if whole_records(data, mark_at - _MARK_AT, count=1)[0]:
+            return mark_at - _MARK_AT
         mark_at = data.find(MARK, mark_at + 1)
-    return None
+    return len(data)
 
 
 def segment_record(vehicle: str, boot_id: str, *, next_sequence: int, spooled_ns: int) -> bytes:

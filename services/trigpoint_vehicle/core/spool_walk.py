@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from trigpoint.errors import LogDamaged
 from trigpoint.events.codec import schema_name
 from trigpoint.events.observed import VehicleDescribed
 from trigpoint_vehicle.core.spool_records import (
@@ -17,10 +16,11 @@ from trigpoint_vehicle.core.spool_records import (
     channel_record,
     encode_record,
     next_whole_record,
-    record_at,
+    whole_records,
 )
 
 DESCRIPTION_SCHEMA = schema_name(VehicleDescribed)
+TOGETHER = 256  # records at a time
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,43 +59,30 @@ class _Range:
     last: int
 
 
-def walk(data: bytes) -> Iterator[Record | Gap]:
-    """The whole records in order, and where there is none the bytes up to the next."""
+def walk(data: bytes) -> Iterator[list[Record] | Gap]:
+    """The whole records in order, some at a time, and where there is none the bytes up to the next."""
     at = 0
     while at < len(data):
-        record = _whole_at(data, at)
-        if record is not None:
-            yield record
-            at = record.end
-            continue
-        following = next_whole_record(data, at)
-        end = len(data) if following is None else following
-        yield Gap(at, end)
+        records, end = whole_records(data, at, count=TOGETHER)
+        if records:
+            yield records
+        else:
+            end = next_whole_record(data, at)
+            yield Gap(at, end)
         at = end
-
-
-def _whole_at(data: bytes, at: int) -> Record | None:
-    try:
-        return record_at(data, at)
-    except LogDamaged:
-        return None
 
 
 def contents_of(data: bytes) -> Contents:
     """How much a segment holds, and how much of it is whole."""
-    messages = payload_bytes = whole_bytes = 0
-    gaps, channels = [], set()
-    for part in walk(data):
-        if isinstance(part, Gap):
-            gaps.append(part)
-            continue
-        whole_bytes = part.end
-        if part.kind == CHANNEL:
-            channels.add(part.channel)
-        if part.kind == MESSAGE and part.channel in channels:
-            messages += 1
-            payload_bytes += len(part.body)
-    return Contents(messages=messages, payload_bytes=payload_bytes, whole_bytes=whole_bytes, gaps=tuple(gaps))
+    gaps = tuple(part for part in walk(data) if isinstance(part, Gap))
+    ends_damaged = bool(gaps) and gaps[-1].end == len(data)
+    messages = [record for channel, record in _messages([data]) if record.kind == MESSAGE]
+    return Contents(
+        messages=len(messages),
+        payload_bytes=sum(len(record.body) for record in messages),
+        whole_bytes=gaps[-1].start if ends_damaged else len(data),
+        gaps=gaps,
+    )
 
 
 def without_data(segments: Sequence[bytes]) -> Dropped:
@@ -118,13 +105,17 @@ def without_data(segments: Sequence[bytes]) -> Dropped:
 def _messages(segments: Sequence[bytes]) -> Iterator[tuple[SpoolChannel, Record]]:
     for data in segments:
         channels: dict[int, SpoolChannel] = {}
-        for part in walk(data):
-            if isinstance(part, Gap):
-                continue
-            if part.kind == CHANNEL:
-                channels[part.channel] = channel_of(part)
-            elif part.kind in (MESSAGE, DROPPED) and part.channel in channels:
-                yield channels[part.channel], part
+        for record in _records(data):
+            if record.kind == CHANNEL:
+                channels[record.channel] = channel_of(record)
+            elif record.kind in (MESSAGE, DROPPED) and record.channel in channels:
+                yield channels[record.channel], record
+
+
+def _records(data: bytes) -> Iterator[Record]:
+    for part in walk(data):
+        if not isinstance(part, Gap):
+            yield from part
 
 
 def _extend(kept: list[_Range | tuple[SpoolChannel, Record]], gone: _Range) -> None:
@@ -137,9 +128,9 @@ def _extend(kept: list[_Range | tuple[SpoolChannel, Record]], gone: _Range) -> N
 
 def _beginning(segments: Sequence[bytes]) -> bytes:
     for data in segments:
-        first = _whole_at(data, 0)
-        if first is not None and first.kind == SEGMENT:
-            return data[: first.end]
+        records, end = whole_records(data, 0, count=1)
+        if records and records[0].kind == SEGMENT:
+            return data[:end]
     return b""
 
 

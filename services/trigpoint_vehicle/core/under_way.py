@@ -1,27 +1,12 @@
 """What was handed to the bus and is not acknowledged: a bounded window over one vehicle's messages, oldest first."""
 
 from collections import Counter, deque
-from typing import Generic, Protocol, TypeVar
 
 from trigpoint.events.envelope import EventIdentity
+from trigpoint_vehicle.core.outgoing import Outgoing
 
 
-class Sendable(Protocol):
-    """A message that can be acknowledged."""
-
-    @property
-    def identity(self) -> EventIdentity:
-        """What an acknowledgement of its boot covers by number."""
-
-    @property
-    def payload(self) -> bytes:
-        """What counts against the window."""
-
-
-SendableT = TypeVar("SendableT", bound=Sendable)
-
-
-class UnderWay(Generic[SendableT]):
+class UnderWay:
     """The window: messages to be sent, then those sent; an acknowledgement takes them out at the old end.
 
     Only what was sent is ever taken out, whatever an acknowledgement claims.
@@ -30,8 +15,8 @@ class UnderWay(Generic[SendableT]):
     def __init__(self, *, limit: int, limit_bytes: int) -> None:
         self._limit = limit
         self._limit_bytes = limit_bytes
-        self._unsent: deque[SendableT] = deque()
-        self._sent: deque[SendableT] = deque()
+        self._unsent: deque[Outgoing] = deque()
+        self._sent: deque[Outgoing] = deque()
         self._to_repeat = 0  # the first so many of the unsent were sent before
         self._bytes = 0
         self._sent_of_boot: Counter[str] = Counter()
@@ -53,7 +38,7 @@ class UnderWay(Generic[SendableT]):
         return len(self._unsent)
 
     @property
-    def oldest(self) -> SendableT:
+    def oldest(self) -> Outgoing:
         """The one that waits longest. Raises IndexError if there is none."""
         return self._sent[0] if self._sent else self._unsent[0]
 
@@ -67,14 +52,14 @@ class UnderWay(Generic[SendableT]):
         """How many more bytes fit in."""
         return max(self._limit_bytes - self._bytes, 0)
 
-    def add(self, message: SendableT) -> None:
+    def add(self, message: Outgoing) -> None:
         """The message queued behind the others."""
         self._unsent.append(message)
         self._bytes += len(message.payload)
 
-    def to_send(self, *, count: int, size_bytes: int) -> list[SendableT]:
+    def to_send(self, *, count: int, size_bytes: int) -> list[Outgoing]:
         """The next messages, oldest first, at most `count` and no more bytes than that (but at least one); now sent."""
-        chosen: list[SendableT] = []
+        chosen: list[Outgoing] = []
         while self._unsent and len(chosen) < count and (size_bytes > 0 or not chosen):
             message = self._unsent[0]
             size_bytes -= len(message.payload)
@@ -84,16 +69,15 @@ class UnderWay(Generic[SendableT]):
             self._mark_sent(message)
         return chosen
 
-    def _mark_sent(self, message: SendableT) -> None:
-        identity = message.identity
+    def _mark_sent(self, message: Outgoing) -> None:
+        boot_id, sequence = message.channel.boot_id, message.sequence
         self._sent.append(message)
         if self._to_repeat:
             self._to_repeat -= 1
             self.resent += 1
         else:
-            self._sent_of_boot[identity.boot_id] += 1
-            highest = self._highest_sent.get(identity.boot_id, identity.sequence)
-            self._highest_sent[identity.boot_id] = max(identity.sequence, highest)
+            self._sent_of_boot[boot_id] += 1
+            self._highest_sent[boot_id] = max(sequence, self._highest_sent.get(boot_id, sequence))
 
     def send_again(self) -> int:
         """How many messages are to be sent once more: all that were sent and not acknowledged."""
@@ -113,26 +97,26 @@ class UnderWay(Generic[SendableT]):
             self._acknowledged[boot_id] = reached
         return self._done(self._sent) + (self._done_again() if not self._sent else 0)
 
-    def _done(self, messages: deque[SendableT]) -> int:
+    def _done(self, messages: deque[Outgoing]) -> int:
         done = 0
-        while messages and self._covered(messages[0].identity):
+        while messages and self._covered(messages[0]):
             self._forget(messages.popleft())
             done += 1
         return done
 
     def _done_again(self) -> int:
         done = 0
-        while self._to_repeat and self._covered(self._unsent[0].identity):
+        while self._to_repeat and self._covered(self._unsent[0]):
             self._forget(self._unsent.popleft())
             self._to_repeat -= 1
             done += 1
         return done
 
-    def _covered(self, identity: EventIdentity) -> bool:
-        return identity.sequence <= self._acknowledged.get(identity.boot_id, -1)
+    def _covered(self, message: Outgoing) -> bool:
+        return message.sequence <= self._acknowledged.get(message.channel.boot_id, -1)
 
-    def _forget(self, message: SendableT) -> None:
-        boot_id = message.identity.boot_id
+    def _forget(self, message: Outgoing) -> None:
+        boot_id = message.channel.boot_id
         self._bytes -= len(message.payload)
         self._sent_of_boot[boot_id] -= 1
         if not self._sent_of_boot[boot_id]:
