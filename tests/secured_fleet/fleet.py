@@ -11,7 +11,7 @@ from trigpoint.bus.ports import BusMessage
 from trigpoint.bus.register import Role
 from trigpoint.bus.tls import TlsFiles
 from trigpoint.bus.zenoh_bus import ZenohBus, ZenohSettings
-from trigpoint.configuration.authority import CERTIFICATE_NAME, ISSUED_NAME, Authority, make_authority
+from trigpoint.configuration.authority import CERTIFICATE_NAME, ISSUED_NAME, PUBLIC_NAME, Authority, make_authority
 from trigpoint.events.envelope import EventIdentity
 
 DAYS = 30
@@ -43,7 +43,7 @@ def issue(authority: Authority, name: str, role: Role, *, ago_days: int = 0, day
 def files_of(folder: Path, name: str, *, trusting: Path | None = None) -> TlsFiles:
     """The files of a name of the authority in a folder, with another authority to trust if one is given."""
     return TlsFiles(
-        authority_file=(trusting or folder) / "authority" / CERTIFICATE_NAME,
+        authority_file=(trusting or folder) / "authority" / PUBLIC_NAME / CERTIFICATE_NAME,
         certificate_file=folder / "authority" / ISSUED_NAME / f"{name}.pem",
         key_file=folder / "authority" / ISSUED_NAME / f"{name}.key",
     )
@@ -97,7 +97,7 @@ def configuration_of(folder: Path, *, endpoint: str, http: dict[str, int], more:
     path.write_text(
         f'[fleet]\ndata = "{folder / "data"}"\n'
         f'[bus]\nmode = "client"\nconnect = ["{endpoint}"]\n[bus.tls]\n{tls_lines(files_of(folder, "services"))}'
-        f'[router]\nlisten = ["{endpoint}"]\nregister_file = "{folder / "authority" / "register.json"}"\n'
+        f'[router]\nlisten = ["{endpoint}"]\nregister_file = "{folder / "authority" / PUBLIC_NAME / "register.json"}"\n'
         f"[router.tls]\n{tls_lines(files_of(folder, 'router'))}[http]\n{ports}{more}",
         encoding="utf-8",
     )

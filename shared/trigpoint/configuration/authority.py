@@ -1,7 +1,8 @@
 """A private authority: it signs the certificates of a fleet's vehicles, services, clients and routers.
 
-Ed25519 keys, which Zenoh's TLS takes (tried with 1.10). Its folder: `authority.pem`, its key `authority.key`, the
-register, and a folder `issued` with a certificate and a key a name. cryptography's one home.
+Ed25519 keys, which Zenoh's TLS takes (tried with 1.10). Its folder: its key `authority.key`; `public` with its
+certificate `authority.pem` and the register, for everyone to have; `issued` with a certificate and a key a name.
+cryptography's one home.
 """
 
 import datetime
@@ -28,7 +29,8 @@ from trigpoint.bus.register import REGISTER_NAME, Register, Registration, Role, 
 from trigpoint.errors import InputError
 from trigpoint.events.keys import valid_name
 
-CERTIFICATE_NAME, KEY_NAME, ISSUED_NAME = "authority.pem", "authority.key", "issued"
+KEY_NAME, ISSUED_NAME, PUBLIC_NAME = "authority.key", "issued", "public"
+CERTIFICATE_NAME = "authority.pem"
 AUTHORITY_DAYS = 3650
 DAYS_LIMIT = 825  # of an issued certificate: what is stolen unnoticed ends some day
 CLOCK_SLACK_S = 300  # a certificate is valid this long before it was made: clocks differ
@@ -51,14 +53,14 @@ class Authority:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         try:
-            self._certificate = x509.load_pem_x509_certificate((folder / CERTIFICATE_NAME).read_bytes())
+            self._certificate = x509.load_pem_x509_certificate((folder / PUBLIC_NAME / CERTIFICATE_NAME).read_bytes())
         except (OSError, ValueError) as error:
             raise InputError(f"no authority in {folder}: {error}; `trigpoint certs init` makes one") from error
 
     @property
     def register_file(self) -> Path:
         """Where its register is."""
-        return self._folder / REGISTER_NAME
+        return self._folder / PUBLIC_NAME / REGISTER_NAME
 
     @property
     def not_after_s(self) -> int:
@@ -145,9 +147,11 @@ def make_authority(folder: Path, *, name: str, now_s: int, passphrase: bytes | N
     valid_name(name)
     if passphrase is not None and len(passphrase) < PASSPHRASE_CHARACTERS:
         raise InputError(f"passphrase of {len(passphrase)} characters: at least {PASSPHRASE_CHARACTERS}")
-    if (folder / KEY_NAME).exists() or (folder / CERTIFICATE_NAME).exists():
+    public = folder / PUBLIC_NAME
+    if (folder / KEY_NAME).exists() or public.exists():
         raise InputError(f"{folder} holds an authority already: what it signed would be worthless with a new one")
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    public.mkdir(mode=0o755)
     key = Ed25519PrivateKey.generate()
     subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
     certificate = (
@@ -157,8 +161,8 @@ def make_authority(folder: Path, *, name: str, now_s: int, passphrase: bytes | N
         .sign(key, None)
     )
     _write_key(folder / KEY_NAME, key, NoEncryption() if passphrase is None else BestAvailableEncryption(passphrase))
-    _write(folder / CERTIFICATE_NAME, certificate.public_bytes(Encoding.PEM), mode=0o644)
-    write_register(folder / REGISTER_NAME, Register())
+    _write(public / CERTIFICATE_NAME, certificate.public_bytes(Encoding.PEM), mode=0o644)
+    write_register(public / REGISTER_NAME, Register())
     return Authority(folder)
 
 

@@ -26,7 +26,9 @@ def issued(authority: Path, *words: str) -> x509.Certificate:
 
 def test_a_certificate_names_its_owner_and_is_signed_by_the_authority(authority: Path) -> None:
     certificate = issued(authority, "veh-a", "--role", "vehicle")
-    certificate.verify_directly_issued_by(x509.load_pem_x509_certificate((authority / "authority.pem").read_bytes()))
+    certificate.verify_directly_issued_by(
+        x509.load_pem_x509_certificate((authority / "public" / "authority.pem").read_bytes())
+    )
     assert certificate.subject.rfc4514_string() == "CN=veh-a"
 
 
@@ -98,7 +100,7 @@ def test_a_certificate_that_ends_soon_is_warned_of(authority: Path) -> None:
 
 def test_the_register_holds_no_key(authority: Path) -> None:
     issued(authority, "veh-a", "--role", "vehicle")
-    assert set(json.loads((authority / "register.json").read_text())["certificates"][0]) == {
+    assert set(json.loads((authority / "public" / "register.json").read_text())["certificates"][0]) == {
         "name",
         "common_name",
         "role",
