@@ -1,24 +1,27 @@
-"""A recorded drive sent over the bus as its vehicle would have: stored, forwarded, and sent again until it is kept."""
+"""A recorded drive sent over the bus as its vehicle would have: in order, and again until all of it is acknowledged."""
 
-import logging
-import time
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
-from itertools import chain
+from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 
-from trigpoint.bus.event_messages import event_message
-from trigpoint.bus.ports import Bus, BusMessage, Subscription
+from trigpoint.bus.ports import Bus
 from trigpoint.errors import InputError, LogDamaged, ServiceError
-from trigpoint.events.codec import event_class
+from trigpoint.events.codec import encode
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.keys import DEFAULT_ROOT
 from trigpoint.events.observed import Observed
-from trigpoint.events.uplink import acknowledgement_key, uplink_key
-from trigpoint.logs.vehicle_log import RawMessage, read_vehicle_log
+from trigpoint.logs.vehicle_log import read_vehicle_log
+from trigpoint_vehicle.core.outgoing import Outgoing, SendChannel
+from trigpoint_vehicle.forwarding import Forwarder
+from trigpoint_vehicle.settings import VehicleSettings
+from trigpoint_vehicle.spool_reading import send_channel
 
-logger = logging.getLogger(__name__)
+STEP_S = 0.05  # how long to wait for an acknowledgement before looking whether to send again
+ACK_TIMEOUT_MIN_S = 1e-3
+NUMBER_LIMIT = 2**63  # signed 64 bits
+
+Numbered = tuple[str, bytes, EventIdentity, int]  # schema name, payload, identity, stamp in ns
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,6 +37,15 @@ class ReplaySettings:
     attempts: int = 10
     listener_timeout_s: float = 10.0
 
+    def sending(self) -> VehicleSettings:
+        """The same as a vehicle's settings."""
+        timeout_s = max(self.ack_timeout_s, ACK_TIMEOUT_MIN_S)
+        return replace(
+            VehicleSettings(root=self.root, window_count=self.window, together_count=self.together),
+            ack_timeout_s=timeout_s,
+            ack_timeout_max_s=timeout_s,
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplayReport:
@@ -44,78 +56,55 @@ class ReplayReport:
     resent: int
 
 
-class _UnderWay:
-    """One vehicle's messages under way: those sent and not yet acknowledged, oldest first."""
+class _Recorded:
+    """The messages of a drive as a forwarder takes them; what ends them early is kept in `damage`."""
 
-    def __init__(self, bus: Bus, acknowledgements: Subscription, settings: ReplaySettings) -> None:
-        self._bus = bus
-        self._acknowledgements = acknowledgements
-        self._settings = settings
-        self._unacknowledged: deque[BusMessage] = deque()
-        self._gathered: list[BusMessage] = []
-        self.sent = 0
-        self.resent = 0
+    def __init__(self, messages: Iterator[Numbered], *, root: str, progress: Callable[[int], None] | None) -> None:
+        self._messages, self._root, self._progress = messages, root, progress
+        self._channels: dict[tuple[str, str, str], SendChannel] = {}
+        self._ahead: list[Outgoing] = []
+        self.damage: LogDamaged | None = None
+        self.is_over = False
+        self.count = 0
 
-    def send(self, message: BusMessage) -> None:
-        """The message sent, once there is room for it among those under way."""
-        if len(self._unacknowledged) >= self._settings.window:
-            self._send_gathered()
-        while len(self._unacknowledged) >= self._settings.window:
-            self._await_progress()
-        self._unacknowledged.append(message)
-        self._gathered.append(message)
-        if len(self._gathered) >= self._settings.together:
-            self._send_gathered()
+    def first(self) -> Outgoing:
+        """The message that will be read next. Raises InputError if there is none."""
+        self._ahead += self._taken(1)
+        if not self._ahead:
+            raise self.damage or InputError("no message to replay: a drive has at least its VehicleDescribed")
+        return self._ahead[0]
 
-    def _send_gathered(self) -> None:
-        self._bus.publish_all(self._gathered)
-        self.sent += len(self._gathered)
-        self._gathered.clear()
-        while acknowledgement := self._acknowledgements.receive(0.0):
-            self._accept(acknowledgement.identity)
+    def read(self, *, count: int, size_bytes: int) -> list[Outgoing]:
+        """The next messages, at most `count`; a bundle of them may go over `size_bytes`."""
+        ahead, self._ahead = self._ahead, []
+        messages = ahead + self._taken(count - len(ahead))
+        self.count += len(messages)
+        if self._progress is not None and messages:
+            self._progress(len(messages))
+        return messages
 
-    def finish(self) -> None:
-        """Every message is acknowledged."""
-        self._send_gathered()
-        while self._unacknowledged:
-            self._await_progress()
+    def released(self, count: int) -> None:
+        """Nothing: the record keeps its messages."""
 
-    def _accept(self, acknowledged: EventIdentity) -> bool:
-        """True if the acknowledgement was about something under way."""
-        under_way = len(self._unacknowledged)
-        while self._unacknowledged and _covers(acknowledged, self._unacknowledged[0].identity):
-            self._unacknowledged.popleft()
-        return len(self._unacknowledged) < under_way
+    def _taken(self, count: int) -> list[Outgoing]:
+        taken: list[Outgoing] = []
+        try:
+            for numbered in islice(self._messages, count):
+                taken.append(self._outgoing(numbered))
+        except LogDamaged as error:
+            self.damage = error
+        self.is_over = self.is_over or len(taken) < count
+        return taken
 
-    def _await_progress(self) -> None:
-        for _ in range(self._settings.attempts):
-            if self._progressed():
-                return
-            self._send_again()
-        if self._progressed():
-            return
-        oldest = self._unacknowledged[0].identity
-        raise ServiceError(
-            f"{oldest}: {len(self._unacknowledged)} messages unacknowledged after {self._settings.attempts + 1} "
-            f"times {self._settings.ack_timeout_s:g} s; what was acknowledged before is kept"
-        )
-
-    def _progressed(self) -> bool:
-        deadline_s = time.monotonic() + self._settings.ack_timeout_s
-        while (left_s := deadline_s - time.monotonic()) > 0.0:
-            acknowledgement = self._acknowledgements.receive(left_s)
-            if acknowledgement is not None and self._accept(acknowledgement.identity):
-                return True
-        return False
-
-    def _send_again(self) -> None:
-        logger.warning("%d messages sent again from %s", len(self._unacknowledged), self._unacknowledged[0].identity)
-        self._bus.publish_all(tuple(self._unacknowledged))
-        self.resent += len(self._unacknowledged)
-
-
-def _covers(acknowledged: EventIdentity, sent: EventIdentity) -> bool:
-    return acknowledged.boot_id == sent.boot_id and acknowledged.sequence >= sent.sequence
+    def _outgoing(self, numbered: Numbered) -> Outgoing:
+        schema_name, payload, identity, stamp_ns = numbered
+        if not max(abs(identity.sequence), abs(stamp_ns)) < NUMBER_LIMIT:
+            raise InputError(f"{identity} at {stamp_ns} ns: signed 64 bits are the limit")
+        kind = identity.source, identity.boot_id, schema_name
+        channel = self._channels.get(kind)
+        if channel is None:
+            channel = self._channels[kind] = send_channel(*kind, root=self._root)
+        return Outgoing(channel, identity.sequence, stamp_ns, payload)
 
 
 def replay_log(
@@ -125,13 +114,13 @@ def replay_log(
     settings: ReplaySettings | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> ReplayReport:
-    """Every whole message of a vehicle's log sent as it is, all of them acknowledged; `progress` hears of each one.
+    """Every whole message of a vehicle's log sent as it is, all of them acknowledged; `progress` hears of them.
 
     Raises LogDamaged, after the whole ones are acknowledged, for a damaged file, InputError for one without a message,
     ServiceError if nobody listens or acknowledges.
     """
-    chosen = settings if settings is not None else ReplaySettings()
-    return _replay(_recorded(read_vehicle_log(path), chosen.root), bus, chosen, progress)
+    messages = ((one.schema_name, one.payload, one.identity, one.stamp_ns) for one in read_vehicle_log(path))
+    return _replay(messages, bus, settings if settings is not None else ReplaySettings(), progress)
 
 
 def replay_rows(
@@ -141,55 +130,41 @@ def replay_rows(
     settings: ReplaySettings | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> ReplayReport:
-    """One vehicle's events sent in order, all of them acknowledged; `progress` hears of each one.
+    """One vehicle's events sent in order, all of them acknowledged; `progress` hears of them.
 
     Raises InputError if there are none, ServiceError if nobody listens or acknowledges.
     """
-    chosen = settings if settings is not None else ReplaySettings()
-    return _replay(_encoded(rows, chosen.root), bus, chosen, progress)
+    messages = ((*encode(row.event), row.identity, row.stamp_ns) for row in rows)
+    return _replay(messages, bus, settings if settings is not None else ReplaySettings(), progress)
 
 
 def _replay(
-    messages: Iterator[BusMessage], bus: Bus, settings: ReplaySettings, progress: Callable[[int], None] | None
+    messages: Iterator[Numbered], bus: Bus, settings: ReplaySettings, progress: Callable[[int], None] | None
 ) -> ReplayReport:
-    first = next(messages, None)
-    if first is None:
-        raise InputError("no message to replay: a drive has at least its VehicleDescribed")
-    vehicle = first.identity.source
-    acknowledgements = bus.subscribe(acknowledgement_key(vehicle, root=settings.root))
+    recorded = _Recorded(messages, root=settings.root, progress=progress)
+    first = recorded.first()
+    forwarder = Forwarder(recorded, first.channel.source, settings.sending())
+    forwarder.use(bus)
     try:
-        _require_listener(bus, first.key, settings.listener_timeout_s)
-        under_way = _UnderWay(bus, acknowledgements, settings)
-        try:
-            for message in chain((first,), messages):
-                under_way.send(message)
-                if progress is not None:
-                    progress(1)
-        except LogDamaged:
-            under_way.finish()
-            raise
-        under_way.finish()
+        if not bus.await_listener(first.channel.key, settings.listener_timeout_s):
+            raise ServiceError(
+                f"nobody listens to {first.channel.key} after {settings.listener_timeout_s:g} s: is ingest running?"
+            )
+        _forward(forwarder, recorded, settings)
     finally:
-        acknowledgements.close()
-    return ReplayReport(vehicle=vehicle, messages=under_way.sent, resent=under_way.resent)
+        forwarder.leave()
+    if recorded.damage is not None:
+        raise recorded.damage
+    return ReplayReport(vehicle=first.channel.source, messages=recorded.count, resent=forwarder.resent)
 
 
-def _recorded(messages: Iterable[RawMessage], root: str) -> Iterator[BusMessage]:
-    for message in messages:
-        yield BusMessage(
-            key=uplink_key(message.identity.source, event_class(message.schema_name), root=root),
-            schema_name=message.schema_name,
-            payload=message.payload,
-            identity=message.identity,
-            stamp_ns=message.stamp_ns,
-        )
-
-
-def _encoded(rows: Iterable[Envelope[Observed]], root: str) -> Iterator[BusMessage]:
-    for envelope in rows:
-        yield event_message(envelope, key=uplink_key(envelope.identity.source, type(envelope.event), root=root))
-
-
-def _require_listener(bus: Bus, key: str, timeout_s: float) -> None:
-    if not bus.await_listener(key, timeout_s):
-        raise ServiceError(f"nobody listens to {key} after {timeout_s:g} s: is ingest running?")
+def _forward(forwarder: Forwarder, recorded: _Recorded, settings: ReplaySettings) -> None:
+    wait_s = min(settings.ack_timeout_s, STEP_S)
+    is_more = True
+    while forwarder.waiting or not recorded.is_over:
+        is_more = forwarder.step(0.0 if is_more else wait_s)
+        if forwarder.tries_in_vain > settings.attempts:
+            raise ServiceError(
+                f"{forwarder.oldest}: {forwarder.waiting} messages unacknowledged after {forwarder.tries_in_vain} "
+                f"times {settings.ack_timeout_s:g} s; what was acknowledged before is kept"
+            )
