@@ -1,14 +1,15 @@
 """An authority, the certificates of a small fleet, its router, and anyone's session on it."""
 
+import re
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from secured_fleet.processes import RunningProcess, free_port, running
+from command_runs.processes import LOOK_S, Fleet, Process, free_ports, trigpoint_process
 from trigpoint.bus.ports import BusMessage
-from trigpoint.bus.register import Role
+from trigpoint.bus.register import REGISTER_NAME, Role
 from trigpoint.bus.tls import TlsFiles
 from trigpoint.bus.zenoh_bus import ZenohBus, ZenohSettings
 from trigpoint.configuration.authority import CERTIFICATE_NAME, ISSUED_NAME, PUBLIC_NAME, Authority, make_authority
@@ -58,15 +59,28 @@ def tls_lines(files: TlsFiles) -> str:
     )
 
 
+def comes_true(condition: Callable[[], bool], *, within_s: float = 10.0) -> bool:
+    """Whether a condition holds now or soon: loopback takes milliseconds, the rest is a slow machine's share."""
+    end_s = time.monotonic() + within_s
+    while not condition():
+        if time.monotonic() > end_s:
+            return False
+        time.sleep(LOOK_S)
+    return True
+
+
 @dataclass(frozen=True, slots=True)
 class SecuredFleet:
-    """A fleet's folder, authority, router process and configuration file."""
+    """A fleet with its authority and its running router."""
 
-    folder: Path
+    fleet: Fleet
     authority: Authority
-    router: RunningProcess
-    endpoint: str
-    configuration: Path
+    router: Process
+
+    @property
+    def folder(self) -> Path:
+        """Where all of it is."""
+        return self.fleet.folder
 
     def settings(self, name: str) -> ZenohSettings:
         """How a name of the fleet comes to the router."""
@@ -74,34 +88,44 @@ class SecuredFleet:
 
     def settings_with(self, files: TlsFiles) -> ZenohSettings:
         """How whoever has these files comes to the router; it tries for half a second."""
-        return ZenohSettings(mode="client", connect=(self.endpoint,), connect_timeout_s=0.5, tls=files)
+        return ZenohSettings(mode="client", connect=(self.fleet.endpoint,), connect_timeout_s=0.5, tls=files)
 
     def session(self, name: str) -> ZenohBus:
         """A name's session on the bus."""
         return ZenohBus(self.settings(name))
 
+    def metric(self, process: str, name: str, label: str = "") -> float:
+        """The sum of a process's metric over the labels that hold a text."""
+        body = self.fleet.page(process, "/metrics")[1]
+        found = re.findall(rf"^{name}({{.*}})? (\S+)$", body, flags=re.MULTILINE)
+        return sum(float(value) for labels, value in found if label in labels)
+
     def refused(self) -> float:
         """How many refusals the router has counted."""
-        return self.router.metric("trigpoint_refused_access_total")
+        return self.metric("router", "trigpoint_refused_access_total")
 
     def refusals(self) -> list[tuple[str, str, str]]:
         """Who was refused, what, and on which key, as the router logged it."""
-        rows = [row for row in self.router.rows() if row["message"] == "refused"]
+        rows = [row for row in self.router.logged() if row["message"] == "refused"]
         return [(row["who"], row["what"], row["key"]) for row in rows]
 
 
-def configuration_of(folder: Path, *, endpoint: str, http: dict[str, int], more: str = "") -> Path:
-    """The configuration of a secured fleet, its services under the name `services`."""
-    path = folder / "trigpoint.toml"
-    ports = "".join(f"{name}_port = {port}\n" for name, port in http.items())
-    path.write_text(
-        f'[fleet]\ndata = "{folder / "data"}"\n'
-        f'[bus]\nmode = "client"\nconnect = ["{endpoint}"]\n[bus.tls]\n{tls_lines(files_of(folder, "services"))}'
-        f'[router]\nlisten = ["{endpoint}"]\nregister_file = "{folder / "authority" / PUBLIC_NAME / "register.json"}"\n'
+def secured_configuration(folder: Path, *, more: str = "") -> Fleet:
+    """The configuration of a secured fleet, its services under the name `services`; `more` is added."""
+    processes = ("up", "router", "ingest", "filtering", "optimisation", "landmarks")
+    *numbers, last = free_ports(len(processes) + 1)
+    fleet = Fleet(folder=folder, ports=dict(zip(processes, numbers, strict=True)), endpoint=f"tls/127.0.0.1:{last}")
+    ports = "".join(f"{name}_port = {port}\n" for name, port in fleet.ports.items())
+    register = folder / "authority" / PUBLIC_NAME / REGISTER_NAME
+    fleet.config.write_text(
+        f'[fleet]\ndata = "{fleet.data}"\n'
+        f'[bus]\nmode = "client"\nconnect = ["{fleet.endpoint}"]\nconnect_timeout_s = 30.0\n'
+        f"[bus.tls]\n{tls_lines(files_of(folder, 'services'))}"
+        f'[router]\nlisten = ["{fleet.endpoint}"]\nregister_file = "{register}"\n'
         f"[router.tls]\n{tls_lines(files_of(folder, 'router'))}[http]\n{ports}{more}",
         encoding="utf-8",
     )
-    return path
+    return fleet
 
 
 @contextmanager
@@ -109,11 +133,10 @@ def secured_fleet(folder: Path, *, more: str = "") -> Iterator[SecuredFleet]:
     """A fleet with its router running; `more` are further lines of the configuration."""
     folder.mkdir(parents=True, exist_ok=True)
     authority = authority_of(folder)
-    endpoint, http = f"tls/127.0.0.1:{free_port()}", {"router": free_port(), "ingest": free_port()}
-    configuration = configuration_of(folder, endpoint=endpoint, http=http, more=more)
-    with ExitStack() as stack:
-        router = stack.enter_context(running(folder, "router", "--config", configuration, port=http["router"]))
-        yield SecuredFleet(folder, authority, router, endpoint, configuration)
+    fleet = secured_configuration(folder, more=more)
+    with trigpoint_process(folder, "router", "--config", fleet.config) as router:
+        fleet.wait_ready("router")
+        yield SecuredFleet(fleet, authority, router)
 
 
 def message(key: str, *, source: str = "veh-a", sequence: int = 0, payload: bytes = b"fix") -> BusMessage:
