@@ -1,0 +1,1 @@
+"""A whole fleet at work in processes of its own: drives replayed into it, services killed, what is left compared."""

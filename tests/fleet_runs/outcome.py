@@ -1,0 +1,66 @@
+"""What a fleet's run left: the streams of its log and the rows of its database, and how two runs differ."""
+
+from collections.abc import Mapping
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from command_runs.processes import Fleet
+from trigpoint.events.codec import encode
+from trigpoint.landmarks.model import MapRow
+from trigpoint.landmarks.opening import opened_store
+from trigpoint.logs.mcap_log import McapLog
+from trigpoint_landmarks.core.comparison import differences
+
+Row = tuple[int, int, str, bytes]
+"""Sequence, stamp in ns, schema and payload of an event."""
+Boots = Mapping[tuple[str, str, str], tuple[Row, ...]]
+"""The events of each stream, source and boot, in the order of the log."""
+
+WRITERS = {"filtering": ("filtering",), "optimisation": ("optimisation", "odometry")}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """The log and the database of a run."""
+
+    boots: Boots
+    rows: tuple[MapRow, ...]
+
+
+def outcome_of(fleet: Fleet, *, url: str | None = None, password_file: Path | None = None) -> Outcome:
+    """What a run left, after its processes ended."""
+    with closing(McapLog(fleet.data / "log")) as log:
+        boots: dict[tuple[str, str, str], list[Row]] = {}
+        for stream in log.streams():
+            for logged in log.read(stream):
+                identity, event = logged.envelope.identity, logged.envelope.event
+                row = (identity.sequence, logged.envelope.stamp_ns, *encode(event))
+                boots.setdefault((stream, identity.source, identity.boot_id), []).append(row)
+    store = opened_store(
+        url or f"geopackage:{fleet.data / 'landmarks.gpkg'}", password_file=password_file, read_only=True
+    )
+    with closing(store):
+        rows = tuple(store.rows())
+    return Outcome(boots={key: tuple(rows) for key, rows in boots.items()}, rows=rows)
+
+
+def stream_differences(ours: Outcome, theirs: Outcome, *, streams: tuple[str, ...] | None = None) -> list[str]:
+    """The boots whose events are not the same, byte for byte and in the same order."""
+    keys = sorted(ours.boots.keys() | theirs.boots.keys())
+    chosen = [key for key in keys if streams is None or key[0] in streams]
+    return [
+        f"{'/'.join(key)}: {len(ours.boots.get(key, ()))} events, and {len(theirs.boots.get(key, ()))}"
+        for key in chosen
+        if ours.boots.get(key) != theirs.boots.get(key)
+    ]
+
+
+def doubled(outcome: Outcome) -> list[str]:
+    """The boots that hold an event twice."""
+    return ["/".join(key) for key, rows in outcome.boots.items() if len({row[0] for row in rows}) < len(rows)]
+
+
+def row_differences(ours: Outcome, theirs: Outcome) -> list[str]:
+    """The rows of the database that are not the same."""
+    return [f"{one.table} {one.key}: {one.detail}" for one in differences(ours.rows, theirs.rows)]
