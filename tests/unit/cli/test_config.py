@@ -6,15 +6,19 @@ import pytest
 
 from command_runs.running import trigpoint
 
-EXAMPLE = Path(__file__).parents[3] / "deploy" / "trigpoint.toml"
+DEPLOY = Path(__file__).parents[3] / "deploy"
+EXAMPLE = DEPLOY / "machine.toml"
 DATA = "fleet.data=/d"
 
 
-def test_the_configuration_that_ships_is_valid() -> None:
-    assert trigpoint("config", "check", "--config", EXAMPLE).status == 0
+@pytest.mark.parametrize("path", sorted(DEPLOY.rglob("*.toml")), ids=lambda path: path.name)
+def test_a_configuration_that_ships_is_valid(path: Path) -> None:
+    run = trigpoint("config", "check", "--config", path)
+    assert run.err == ""
+    assert run.status == 0
 
 
-def test_the_configuration_that_ships_listens_on_loopback_only() -> None:
+def test_the_configuration_of_one_machine_listens_on_loopback_only() -> None:
     sections = trigpoint("config", "show", "--config", EXAMPLE, "--json").answer["sections"]
     assert sections["http"]["host"]["value"] == "127.0.0.1"
     assert sections["router"]["listen"]["value"] == ["tcp/127.0.0.1:7447"]
