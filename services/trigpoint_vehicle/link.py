@@ -8,6 +8,7 @@ from trigpoint.bus.ports import Bus
 from trigpoint.bus.zenoh_bus import ZenohBus, ZenohSettings
 from trigpoint.errors import ServiceError
 
+RETRY_S = 1.0  # after the first attempt to open a session that failed
 PAUSE_LONGEST_S = 60.0  # between two new sessions, however long nothing is acknowledged
 
 logger = logging.getLogger(__name__)
@@ -23,6 +24,7 @@ class Link:
         self._settings = bus if isinstance(bus, ZenohSettings) else None
         self._own: Bus | None = None
         self._first_s = self._pause_s = reopen_after_s
+        self._retry_s = RETRY_S
         self._now_s = now_s
         self._due_s = now_s()
         self.sessions = 0
@@ -34,16 +36,22 @@ class Link:
             return None
         if self.sessions:
             self._pause_s = min(2.0 * self._pause_s, PAUSE_LONGEST_S)
+        bus = self._lent if self._settings is None else self._new(self._settings)
+        if bus is None:
+            self._due_s = now_s + self._retry_s
+            self._retry_s = min(2.0 * self._retry_s, PAUSE_LONGEST_S)
+            return None
         self._due_s = now_s + self._pause_s
+        self._retry_s = RETRY_S
         self.sessions += 1
-        return self._lent if self._settings is None else self._new(self._settings)
+        return bus
 
     def _new(self, settings: ZenohSettings) -> Bus | None:
         self.close()
         try:
             self._own = ZenohBus(settings)
         except ServiceError as error:
-            logger.warning("%s; the next one in %.0f s", error, self._pause_s)
+            logger.warning("%s; tried again in %.0f s", error, self._retry_s)
         return self._own
 
     def worked(self) -> None:
