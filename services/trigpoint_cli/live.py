@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from trigpoint.bus.zenoh_bus import ZenohBus, ZenohSettings
-from trigpoint.logs.ports import EventLog
+from trigpoint.logs.ports import RecallingLog
 from trigpoint_ingest.app import IngestService
 from trigpoint_ingest.core.tally import IngestReport
 from trigpoint_ingest.settings import IngestSettings
@@ -42,7 +42,7 @@ def free_endpoint() -> str:
         return f"tcp/{LOOPBACK}:{probe.getsockname()[1]}"
 
 
-def ingest_live(paths: Sequence[Path], log: EventLog, progress: Progress) -> IngestReport:
+def ingest_live(paths: Sequence[Path], log: RecallingLog, progress: Progress) -> IngestReport:
     """What came of vehicles' logs sent over the bus, every message acknowledged after it was durable.
 
     Raises what ended the sending or the ingest: AppendFailed, or ServiceError if messages stay unacknowledged.

@@ -1,121 +1,201 @@
 """Ingest at work: vehicles' live messages from the bus into the log, acknowledged once they are durable."""
 
 import logging
+import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from types import TracebackType
+from typing import Self
 
-from trigpoint.bus.listening import ListeningService
-from trigpoint.bus.ports import Bus, BusMessage
-from trigpoint.errors import InputError
-from trigpoint.events.envelope import EventIdentity
-from trigpoint.events.uplink import ACKNOWLEDGEMENT_SCHEMA, acknowledgement_key, uplink_expression
-from trigpoint.logs.ports import EventLog
-from trigpoint_ingest.core.ordering import SequenceOrder
+from trigpoint.bus.ports import Bus
+from trigpoint.errors import AppendFailed
+from trigpoint.logs.ports import RecallingLog
+from trigpoint.observability.metrics import Instruments
+from trigpoint_ingest.claims import VehicleClaims
+from trigpoint_ingest.commit import Group, waits_for_disk
 from trigpoint_ingest.core.tally import IngestReport
-from trigpoint_ingest.core.validation import Drive, drive_of
 from trigpoint_ingest.journal import Journal
+from trigpoint_ingest.reception import Reception
 from trigpoint_ingest.settings import IngestSettings
 
-IDLE_S = 0.005  # between two looks at an empty queue: waking for each message costs more than the message
+IDLE_S = 0.005  # between two looks at an empty queue: waiting for each message costs more than the message
+CLAIM_LOOK_S = 1.0  # between two looks at others' claims
 
 logger = logging.getLogger(__name__)
 
 
-class IngestService(ListeningService):
-    """Hears every vehicle on the bus: order restored, validated, appended in groups, published, acknowledged.
+class IngestService:
+    """Hears its vehicles on the bus: order restored, validated, appended in groups, published, acknowledged.
 
-    Close it (or leave its `with`): what was admitted is then in the log.
+    While a group is made durable the next one is gathered. Close it (or leave its `with`): what was admitted is then
+    in the log.
     """
 
     def __init__(
-        self, log: EventLog, bus: Bus, settings: IngestSettings, *, now_s: Callable[[], float] = time.monotonic
+        self,
+        log: RecallingLog,
+        bus: Bus,
+        settings: IngestSettings,
+        *,
+        instruments: Instruments | None = None,
+        now_s: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._bus = bus
-        self._now_s = now_s
-        self._settings = settings
-        self._journal = Journal(log, bus, settings)
-        self._orders: dict[Drive, SequenceOrder] = {}
-        self._gap_since_s: dict[Drive, float] = {}
-        self._to_acknowledge: set[Drive] = set()
-        self._flushed_s = now_s()
-        self._lost = 0
-        super().__init__(bus.subscribe(uplink_expression(root=settings.root)), idle_s=IDLE_S)
+        """Raises ServiceError if another ingest has claimed one of the vehicles, LogDamaged for a damaged log."""
+        self._settings, self._now_s = settings, now_s
+        self._instruments = instruments if instruments is not None else Instruments("ingest")
+        self._claims = VehicleClaims(bus, settings.vehicles, root=settings.root)
+        try:
+            self._claims.require()
+            self._journal = Journal(log, bus, settings, instruments=self._instruments)
+            self._reception = Reception(bus, self._journal, settings, self._instruments, now_s=now_s)
+        except BaseException:
+            self._claims.release()
+            raise
+        self._committer = ThreadPoolExecutor(1, thread_name_prefix="commit")
+        self._group: Group | None = None
+        self._committing: Future[None] | None = None
+        self._begun_s = self._sealed_s = self._claims_seen_s = now_s()
+        self._blocked = False
+        self._closed = False
+        self.ready = False
+
+    def run(self, stop: threading.Event) -> None:
+        """Works until told to stop.
+
+        Raises AppendFailed when the log cannot be written and waiting would not help, ServiceError when another
+        ingest turns out to hold an earlier claim on a vehicle: then it must stop.
+        """
+        stop.wait(self._settings.claim_settle_s)  # word of others' claims comes by then
+        self._claims.require()
+        self.ready = True
+        try:
+            while not stop.is_set():
+                if not self.step(0.0):
+                    stop.wait(IDLE_S)
+                self._look_at_claims()
+        finally:
+            self.ready = False
 
     def step(self, timeout_s: float) -> bool:
-        """One message taken, or none within the timeout (then False); what is due is flushed."""
-        message = self._subscription.receive(timeout_s)
-        if message is not None:
-            self._take(message)
-        waited_s = self._now_s() - self._flushed_s
-        if self._journal.pending_count >= self._settings.batch_count or waited_s >= self._settings.batch_s:
-            self.flush()
-        return message is not None
+        """What has come is taken, at most a group of it; False if nothing came within the timeout. What is due is
+        committed. Raises AppendFailed."""
+        has_room = (
+            self._journal.pending_count < self._settings.pending_count
+            and self._journal.pending_bytes < self._settings.pending_bytes
+        )
+        taken = self._reception.take(timeout_s) if has_room else 0
+        self._reception.settle()
+        self._advance()
+        self._instruments.queue_depth.set(self._reception.waiting + self._journal.pending_count)
+        return taken > 0
 
-    def _take(self, message: BusMessage) -> None:
-        drive = drive_of(message.identity)
-        order = self._orders.get(drive)
-        if order is None:
-            following = self._journal.admission.acknowledged(drive) + 1
-            order = self._orders[drive] = SequenceOrder(next_sequence=following, capacity=self._settings.held_limit)
-        awaited = order.awaited
-        for next_in_order in order.offer(message):
-            self._journal.take(next_in_order)
-        if order.awaited > awaited:
-            self._gap_since_s.pop(drive, None)
-        if order.held:
-            self._gap_since_s.setdefault(drive, self._now_s())
-        self._to_acknowledge.add(drive)
+    def _advance(self) -> None:
+        """The group under way looked after; without one, the next begun when it is due."""
+        now_s = self._now_s()
+        if self._committing is not None:
+            if self._committing.done():
+                self._finish()
+            elif now_s - self._begun_s > self._settings.slow_append_s:
+                self._tell_blocked(f"a group takes longer than {self._settings.slow_append_s:g} s")
+        elif self._group is not None:
+            if now_s - self._begun_s >= self._settings.disk_retry_s:
+                self._begin(self._group)
+        elif self._is_due(now_s):
+            self._begin(self._sealed())
+
+    def _is_due(self, now_s: float) -> bool:
+        if self._journal.pending_count >= self._settings.batch_count:
+            return True
+        return now_s - self._sealed_s >= self._settings.batch_s and self._has_work()
+
+    def _has_work(self) -> bool:
+        return self._journal.pending_count > 0 or self._reception.has_to_acknowledge
+
+    def _sealed(self) -> Group:
+        group = self._journal.sealed()
+        group.acknowledgements.extend(self._reception.acknowledgements())
+        self._sealed_s = self._now_s()
+        return group
+
+    def _begin(self, group: Group) -> None:
+        self._group, self._begun_s = group, self._now_s()
+        self._committing = self._committer.submit(self._journal.commit, group)
+
+    def _finish(self) -> None:
+        """The end of the group under way. Raises what ended it, unless it is to be tried again."""
+        ended, self._committing = self._committing, None
+        error = ended.exception() if ended is not None else None
+        if error is None:
+            self._group = None
+            if self._blocked:
+                logger.warning("the log takes events again: going on")
+            self._set_blocked(blocked=False)
+        elif isinstance(error, AppendFailed) and waits_for_disk(error):
+            self._tell_blocked(str(error))
+        else:
+            raise error
+
+    def _tell_blocked(self, reason: str) -> None:
+        if not self._blocked:
+            logger.warning("nothing is acknowledged until the log can be written, vehicles keep theirs: %s", reason)
+        self._set_blocked(blocked=True)
+
+    def _set_blocked(self, *, blocked: bool) -> None:
+        self._blocked = blocked
+        self._instruments.append_blocked.set(int(blocked))
+
+    def _look_at_claims(self) -> None:
+        if self._now_s() - self._claims_seen_s >= CLAIM_LOOK_S:
+            self._claims.require()
+            self._claims_seen_s = self._now_s()
 
     def flush(self) -> None:
-        """Everything admitted is in the log, then published, then acknowledged to its vehicles."""
-        self._give_up_old_gaps()
-        self._journal.flush()
-        for drive in sorted(self._to_acknowledge):
-            self._acknowledge(drive)
-        self._to_acknowledge.clear()
-        self._flushed_s = self._now_s()
-        self._warn_of_losses()
-
-    def _warn_of_losses(self) -> None:
-        lost = self._subscription.lost + sum(order.overflowed for order in self._orders.values())
-        if lost > self._lost:
-            logger.warning("%d messages lost to a full queue; vehicles send them again", lost)
-            self._lost = lost
-
-    def _give_up_old_gaps(self) -> None:
-        now_s = self._now_s()
-        for drive, since_s in list(self._gap_since_s.items()):
-            if now_s - since_s >= self._settings.gap_timeout_s:
-                released = self._orders[drive].give_up()
-                logger.error(
-                    "drive %s: messages missing for %.0f s, going on with %d", drive, now_s - since_s, len(released)
-                )
-                for message in released:
-                    self._journal.take(message)
-                del self._gap_since_s[drive]
-
-    def _acknowledge(self, drive: Drive) -> None:
-        vehicle, boot_id = drive
-        try:
-            key = acknowledgement_key(vehicle, root=self._settings.root)
-        except InputError:
-            return  # no vehicle can have this name: its messages are refused, and it hears nothing
-        sequence = self._journal.admission.acknowledged(drive)
-        self._bus.publish(
-            BusMessage(
-                key=key,
-                schema_name=ACKNOWLEDGEMENT_SCHEMA,
-                payload=b"",
-                identity=EventIdentity(vehicle, boot_id, sequence),
-                stamp_ns=0,
-            )
-        )
+        """Everything admitted is in the log, then published, then acknowledged to its vehicles. Raises AppendFailed."""
+        self._reception.settle()
+        if self._committing is not None:
+            self._committing.exception()  # waits; what it says is said again by the next attempt
+            self._finish()
+        if self._group is not None:
+            self._journal.commit(self._group)
+            self._group = None
+        if self._has_work():
+            self._group = self._sealed()
+            self._journal.commit(self._group)
+            self._group = None
+        self._set_blocked(blocked=False)
 
     def report(self) -> IngestReport:
         """What came of the messages so far."""
         return self._journal.tally.report()
 
     def close(self) -> None:
-        """The subscription ended; what was admitted is in the log."""
-        self._subscription.close()
-        self.flush()
+        """The subscriptions ended, what was admitted is in the log, the vehicles free for others; again: no effect.
+
+        Raises AppendFailed: what is not in the log was not acknowledged.
+        """
+        if self._closed:
+            return
+        self._reception.close()
+        try:
+            self.flush()
+        finally:
+            self._let_go()
+
+    def _let_go(self) -> None:
+        self._closed = True
+        self._committer.shutdown()
+        self._journal.close()
+        self._claims.release()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.close()
+        else:
+            self._reception.close()
+            self._let_go()

@@ -1,12 +1,13 @@
 """Vehicles' logs, whole MCAP files, taken into the log message by message; damage costs only what it hit."""
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from pathlib import Path
 
 from trigpoint.bus.ports import Bus
 from trigpoint.errors import EventRejected, InputError, LogDamaged
 from trigpoint.logs.mcap_scan import Damage
-from trigpoint.logs.ports import EventLog
+from trigpoint.logs.ports import RecallingLog
 from trigpoint.logs.vehicle_log import read_whole_messages
 from trigpoint_ingest.core.ordering import described_first
 from trigpoint_ingest.core.tally import DamagedFile, IngestReport
@@ -21,7 +22,7 @@ Progress = Callable[[int], None]
 
 def ingest_logs(
     paths: Sequence[Path],
-    log: EventLog,
+    log: RecallingLog,
     *,
     bus: Bus | None = None,
     settings: IngestSettings | None = None,
@@ -37,9 +38,9 @@ def ingest_logs(
         if not path.is_file():
             raise InputError(f"{path} is not a file: an MCAP log of a vehicle is needed")
     chosen = settings if settings is not None else IngestSettings()
-    journal = Journal(log, bus, chosen)
-    for path in paths:
-        _ingest_file(path, journal, batch_count=chosen.batch_count, progress=progress or _nobody)
+    with closing(Journal(log, bus, chosen)) as journal:
+        for path in paths:
+            _ingest_file(path, journal, batch_count=chosen.batch_count, progress=progress or _nobody)
     return journal.tally.report()
 
 

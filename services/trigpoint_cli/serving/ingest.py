@@ -14,4 +14,4 @@ from trigpoint_ingest.app import IngestService
 def opened(settings: Settings, instruments: Instruments) -> Iterator[Service]:
     """Ingest on the fleet's log and bus."""
     with opened_resources(settings) as resources:
-        yield IngestService(resources.log, resources.bus, settings.ingest)
+        yield IngestService(resources.log, resources.bus, settings.ingest, instruments=instruments)

@@ -1,10 +1,14 @@
 """Messages put back into the order they were sent in: live ones by number, a file's behind its description."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import TypeVar
+
+import numpy as np
 
 from trigpoint.events.codec import schema_name
 from trigpoint.events.observed import VehicleDescribed
+from trigpoint.events.runs import EncodedRun, Integers, joined
 from trigpoint_ingest.core.messages import RawMessage
 from trigpoint_ingest.core.validation import Drive, drive_of
 
@@ -42,13 +46,25 @@ def described_first(messages: Iterable[MessageT]) -> Iterator[tuple[MessageT, bo
             yield message, False
 
 
-class SequenceOrder:
-    """Holds what came early, at most `capacity` messages, until what lies before it has come."""
+@dataclass(frozen=True, slots=True)
+class Released:
+    """What may go on now: messages sent before (duplicates, or late after `give_up`), and those next in order; both
+    ascending, each number once. `doubled` messages were there twice among them and go nowhere.
+    """
+
+    again: EncodedRun | None
+    following: EncodedRun | None
+    doubled: int
+
+
+class RunOrder:
+    """Puts one drive's messages in order: what came early, at most `capacity` messages, is held until what lies before
+    it has come."""
 
     def __init__(self, *, next_sequence: int, capacity: int) -> None:
         self._next = next_sequence
         self._capacity = capacity
-        self._held: dict[int, RawMessage] = {}
+        self._held: EncodedRun | None = None
         self.overflowed = 0
 
     @property
@@ -59,34 +75,51 @@ class SequenceOrder:
     @property
     def held(self) -> int:
         """How many messages wait for an earlier one."""
-        return len(self._held)
+        return 0 if self._held is None else len(self._held)
 
-    def offer(self, message: RawMessage) -> list[RawMessage]:
-        """The messages that may go on now, in order: none while an earlier one is missing.
+    def offer(self, runs: Sequence[EncodedRun]) -> Released:
+        """What may go on now, of the drive's runs that came since the last time and of those held.
 
-        What was sent before goes on at once (it is a duplicate, or late after `give_up`); what finds no room
-        is dropped and counted in `overflowed`: unacknowledged, it will be sent again.
+        What finds no room to wait is dropped, the latest first, and counted in `overflowed`: unacknowledged, it will
+        be sent again.
         """
-        sequence = message.identity.sequence
-        if sequence < self._next:
-            return [message]
-        if sequence > self._next:
-            if len(self._held) < self._capacity or sequence in self._held:
-                self._held[sequence] = message
-            else:
-                self.overflowed += 1
-            return []
-        released = [message]
-        self._next = sequence + 1
-        while self._next in self._held:
-            released.append(self._held.pop(self._next))
-            self._next += 1
+        everything = joined(runs if self._held is None else (self._held, *runs))
+        ordered = _ascending(everything)
+        sequences = ordered.sequences
+        old = int(np.searchsorted(sequences, self._next))
+        stop = old + _run_length(sequences[old:], self._next)
+        if stop > old:
+            self._next = int(sequences[stop - 1]) + 1
+        kept = min(len(ordered), stop + self._capacity)
+        self.overflowed += len(ordered) - kept
+        self._held = _part(ordered, stop, kept)
+        return Released(_part(ordered, 0, old), _part(ordered, old, stop), len(everything) - len(ordered))
+
+    def give_up(self) -> EncodedRun | None:
+        """Everything held, in order: what is missing is not waited for any longer."""
+        released, self._held = self._held, None
+        if released is not None:
+            self._next = int(released.sequences[-1]) + 1
         return released
 
-    def give_up(self) -> list[RawMessage]:
-        """Everything held, in order: what is missing is not waited for any longer."""
-        released = [self._held[sequence] for sequence in sorted(self._held)]
-        self._held.clear()
-        if released:
-            self._next = released[-1].identity.sequence + 1
-        return released
+
+def _part(run: EncodedRun, start: int, stop: int) -> EncodedRun | None:
+    if start == stop:
+        return None
+    return run if stop - start == len(run) else run.part(start, stop)
+
+
+def _ascending(run: EncodedRun) -> EncodedRun:
+    """The messages by their numbers; of those of one number the first that came."""
+    steps = np.diff(run.sequences)
+    if bool((steps > 0).all()):
+        return run
+    order = np.argsort(run.sequences, kind="stable")
+    new = np.diff(run.sequences[order], prepend=run.sequences[order[0]] - 1) != 0
+    return run.picked(order[new])
+
+
+def _run_length(sequences: Integers, first: int) -> int:
+    """How many of ascending sequences (n,) follow one another from `first` on."""
+    gaps = np.flatnonzero(sequences != np.arange(first, first + len(sequences)))
+    return int(gaps[0]) if len(gaps) else len(sequences)

@@ -1,6 +1,10 @@
 """The times of a drive: each sensor's go forward, and none leaves the drive's own stretch of time."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
 
 from trigpoint.errors import EventRejected
 from trigpoint.events.observed import VehicleDescribed
@@ -31,6 +35,14 @@ class DriveStamps:
             self.latest_ns = stamp_ns
         if stamp_ns > self.latest_of_sensor_ns.get(sensor, -1):
             self.latest_of_sensor_ns[sensor] = stamp_ns
+
+    def accept_run(self, stamps_ns: NDArray[np.int64], of_sensor: Mapping[type, NDArray[np.int64]]) -> None:
+        """The stamps of many events taken into the drive, and those of each sensor; none is a description's."""
+        earliest_ns, latest_ns = int(stamps_ns.min()), int(stamps_ns.max())
+        self.earliest_ns = earliest_ns if self.earliest_ns is None else min(self.earliest_ns, earliest_ns)
+        self.latest_ns = max(self.latest_ns, latest_ns)
+        for sensor, own_ns in of_sensor.items():
+            self.latest_of_sensor_ns[sensor] = max(int(own_ns.max()), self.latest_of_sensor_ns.get(sensor, -1))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,3 +75,30 @@ def require_stamp(sensor: type, stamp_ns: int, stamps: DriveStamps, limits: Stam
             f"{stamp_ns} ns is {away_ns / NS_PER_S:.3f} s from the drive's {stamps.earliest_ns} to "
             f"{stamps.latest_ns} ns, limit {limits.jump_limit_s:g} s",
         )
+
+
+def stamps_fit(
+    stamps_ns: NDArray[np.int64], of_sensor: Mapping[type, NDArray[np.int64]], stamps: DriveStamps, limits: StampLimits
+) -> bool:
+    """Whether `require_stamp` would refuse none of these events (n,), none a description, taken one after the other;
+    `of_sensor` are the stamps of each sensor."""
+    if int(stamps_ns.min()) < 0:
+        return False
+    tolerance_ns = round(limits.backwards_tolerance_s * NS_PER_S)
+    for sensor, own_ns in of_sensor.items():
+        first_ns = stamps.latest_of_sensor_ns.get(sensor, int(own_ns[0]))
+        if bool((_latest_before(own_ns, first_ns) - own_ns > tolerance_ns).any()):
+            return False
+    jump_ns = round(limits.jump_limit_s * NS_PER_S)
+    first_ns = int(stamps_ns[0])
+    known = (first_ns, first_ns) if stamps.earliest_ns is None else (stamps.earliest_ns, stamps.latest_ns)
+    earliest_ns, latest_ns = -_latest_before(-stamps_ns, -known[0]), _latest_before(stamps_ns, known[1])
+    return not bool((np.maximum(stamps_ns - latest_ns, earliest_ns - stamps_ns) > jump_ns).any())
+
+
+def _latest_before(stamps_ns: NDArray[np.int64], first_ns: int) -> NDArray[np.int64]:
+    """Of each stamp the latest of `first_ns` and those before it."""
+    before = np.empty_like(stamps_ns)
+    before[0], before[1:] = first_ns, stamps_ns[:-1]
+    latest: NDArray[np.int64] = np.maximum.accumulate(before)
+    return latest

@@ -1,6 +1,6 @@
 """Which events were there already: sets of identities, kept as ranges of sequence numbers."""
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 
 from trigpoint.events.envelope import EventIdentity
 
@@ -31,6 +31,27 @@ class SeenSequences:
             starts.insert(index, sequence)
             stops.insert(index, sequence + 1)
         return True
+
+    def add_range(self, source: str, boot_id: str, *, start: int, stop: int) -> None:
+        """All sequences [start, stop) of a boot are known from now on, whether they were or not."""
+        starts, stops = self._ranges.setdefault((source, boot_id), ([], []))
+        first, last = bisect_left(stops, start), bisect_right(starts, stop)  # ranges [first, last) touch these
+        if first < last:
+            start, stop = min(start, starts[first]), max(stop, stops[last - 1])
+        starts[first:last] = [start]
+        stops[first:last] = [stop]
+
+    def overlaps(self, source: str, boot_id: str, *, start: int, stop: int) -> bool:
+        """Whether any of the sequences [start, stop) of a boot is known."""
+        starts, stops = self._ranges.get((source, boot_id), ([], []))
+        index = bisect_right(stops, start)  # the first range that ends behind the start
+        return index < len(starts) and starts[index] < stop
+
+    def covers(self, source: str, boot_id: str, *, start: int, stop: int) -> bool:
+        """Whether all of the sequences [start, stop) of a boot are known."""
+        starts, stops = self._ranges.get((source, boot_id), ([], []))
+        index = bisect_right(starts, start)
+        return index > 0 and stop <= stops[index - 1]
 
     def __contains__(self, identity: EventIdentity) -> bool:
         starts, stops = self._ranges.get((identity.source, identity.boot_id), ([], []))

@@ -8,6 +8,7 @@ from trigpoint.errors import InputError
 from trigpoint.events.keys import DEFAULT_ROOT, KEY_PATTERNS, KEY_VERSION, valid_name
 
 OBSERVED, SENT = "/obs/", "/up/"
+VEHICLE_CLAIM, FLEET_CLAIM = "ingest", "ingest-of-all"
 UNKNOWN_PATTERN = "veh/{vehicle}/obs/unknown"
 
 ACKNOWLEDGEMENT_SCHEMA = "trigpoint.v1.Acknowledgement"
@@ -31,9 +32,36 @@ def uplink_key(vehicle: str, event_class: type | None, *, root: str = DEFAULT_RO
     return f"{valid_name(root)}/{KEY_VERSION}/{chunks}"
 
 
+def observation_key(vehicle: str, event_class: type, *, root: str = DEFAULT_ROOT) -> str:
+    """The key on which a vehicle's accepted observations of a class are published."""
+    return f"{valid_name(root)}/{KEY_VERSION}/{KEY_PATTERNS[event_class].format(vehicle=valid_name(vehicle))}"
+
+
 def uplink_expression(*, root: str = DEFAULT_ROOT) -> str:
     """The expression that matches whatever any vehicle sends."""
     return f"{valid_name(root)}/{KEY_VERSION}/veh/*/up/*"
+
+
+def vehicle_expression(vehicle: str, *, root: str = DEFAULT_ROOT) -> str:
+    """The expression that matches whatever one vehicle sends."""
+    return f"{valid_name(root)}/{KEY_VERSION}/veh/{valid_name(vehicle)}/up/*"
+
+
+def sender_of(key: str) -> str:
+    """The vehicle on whose key a message came."""
+    return key.split("/")[3]
+
+
+def claim_key(vehicle: str | None, claim_id: str, *, root: str = DEFAULT_ROOT) -> str:
+    """The key by which an ingest claims a vehicle, None for all of the fleet."""
+    name = FLEET_CLAIM if vehicle is None else f"{VEHICLE_CLAIM}/{valid_name(vehicle)}"
+    return f"{valid_name(root)}/{KEY_VERSION}/live/{name}/{valid_name(claim_id)}"
+
+
+def claim_expressions(vehicle: str | None, *, root: str = DEFAULT_ROOT) -> tuple[str, str]:
+    """The expressions that match every claim which excludes one's own to a vehicle, or to all of the fleet."""
+    live = f"{valid_name(root)}/{KEY_VERSION}/live"
+    return f"{live}/{VEHICLE_CLAIM}/{'*' if vehicle is None else valid_name(vehicle)}/*", f"{live}/{FLEET_CLAIM}/*"
 
 
 def acknowledgement_key(vehicle: str, *, root: str = DEFAULT_ROOT) -> str:

@@ -45,6 +45,10 @@ class LogAsOf:
         """The number the next event got, or will get."""
         return min(self._log.next_number(stream), self._counts.get(stream, 0))
 
+    def begins_at(self, stream: str) -> int:
+        """The number of the oldest event that is still there, or of the next one that was to come."""
+        return min(self._log.begins_at(stream), self._counts.get(stream, 0))
+
     def boots(self, stream: str) -> tuple[LoggedBoot, ...]:
         """The boots of a stream that had any event then; times as they are now."""
         known = {(row.envelope.identity.source, row.envelope.identity.boot_id) for row in self.read(stream)}

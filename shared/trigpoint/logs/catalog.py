@@ -7,7 +7,7 @@ import fcntl
 import sqlite3
 import threading
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -307,6 +307,12 @@ def renewed_once(question: Callable[[], AnswerT]) -> AnswerT:
 
 class CatalogDamaged(Exception):
     """A row is not as it was written."""
+
+
+def checked_rows(connection: sqlite3.Connection, table: str) -> Iterator[tuple[Any, ...]]:
+    """Every row of a table without its checksum. Raises CatalogDamaged."""
+    for row in connection.execute(f"SELECT * FROM {table}"):
+        yield _intact(row)
 
 
 def is_damage(error: Exception) -> bool:

@@ -16,9 +16,12 @@ from trigpoint.events.envelope import Envelope, LogPosition
 from trigpoint.events.keys import DEFAULT_MAP, STREAM_PATTERNS
 from trigpoint.events.observed import MapFramePinned, VehicleDescribed
 from trigpoint.events.runs import EncodedRun
+from trigpoint.logs.absences import NAME as ABSENCES_NAME
+from trigpoint.logs.absences import Absence, recorded_absences
 from trigpoint.logs.catalog import NAME, Catalog, CatalogChunk, CatalogFile, FileContents, renewed_once
 from trigpoint.logs.channels import ChannelKey, PackedRows, packed_rows
 from trigpoint.logs.chunks import FRAME, messages, parsed, unpacked
+from trigpoint.logs.headers import chunk_headers, index_bytes
 from trigpoint.logs.log_files import bring_up_to_date, file_path, valid_stream
 from trigpoint.logs.ports import LoggedBoot, LoggedEvent
 from trigpoint.logs.stream_writer import Rotation, StreamWriter
@@ -76,6 +79,7 @@ class McapLog:
         self._rotation, self._software = rotation, software
         self._map = {"name": map_name}
         self._catalog = Catalog(directory / NAME)
+        self._absences: dict[str, tuple[Mark, tuple[Absence, ...]]] = {}
         self._marks: dict[str, Mark | None] = {}
         self._writers: dict[str, StreamWriter] = {}
         self._append_locks: dict[str, threading.Lock] = {}
@@ -138,34 +142,59 @@ class McapLog:
         Raises LogDamaged where a chunk is damaged, after everything before it.
         """
         wanted = _Wanted(first_number, from_ns, until_ns, frozenset(kinds) if kinds is not None else None)
+        for first, chunks in self._chunks_by_file(stream, wanted):
+            yield from self._read_file(stream, first, chunks, wanted)
+
+    def read_headers(self, stream: str) -> Iterator[EncodedRun]:
+        """Identities and times of all events that were durable when reading began, in order; no payload is decoded.
+
+        Raises LogDamaged as `read` does.
+        """
+        for first, chunks in self._chunks_by_file(stream, _Wanted(0, None, None, None)):
+            channels = self._channels(stream, first)
+            path = file_path(self.directory / stream, first)
+            with path.open("rb") as file:
+                for chunk in chunks:
+                    data = _chunk_data(file, path, chunk)
+                    indexes = file.read(index_bytes(chunk.count, len(chunk.channel_ids)))
+                    yield from chunk_headers(data, indexes, chunk.count, channels)
+
+    def _chunks_by_file(self, stream: str, wanted: _Wanted) -> Iterator[tuple[int, list[CatalogChunk]]]:
+        """The files with chunks that may hold what is wanted; LogDamaged raised behind the first damaged one."""
         chunks, damages = self._asked(
             stream,
             lambda catalog: (
-                catalog.chunks(stream, first_number=first_number, from_ns=from_ns, until_ns=until_ns),
-                _damages(catalog.files(stream), first_number),
+                catalog.chunks(
+                    stream, first_number=wanted.first_number, from_ns=wanted.from_ns, until_ns=wanted.until_ns
+                ),
+                _damages(catalog.files(stream), wanted.first_number),
             ),
         )
         by_file: dict[int, list[CatalogChunk]] = {}
         for chunk in chunks:
             by_file.setdefault(chunk.first_number, []).append(chunk)
         for first in sorted(by_file.keys() | damages.keys()):
-            yield from self._read_file(stream, first, by_file.get(first, []), wanted)
+            if first in by_file:
+                yield first, by_file[first]
             if first in damages:
                 raise LogDamaged(damages[first])
 
     def _read_file(
         self, stream: str, first_number: int, chunks: Sequence[CatalogChunk], wanted: _Wanted
     ) -> Iterator[LoggedEvent]:
-        channels = wanted.channels(self._asked(stream, lambda catalog: catalog.channels(stream, first_number)))
+        channels = wanted.channels(self._channels(stream, first_number))
         needed = [chunk for chunk in chunks if not channels.keys().isdisjoint(chunk.channel_ids)]
         if not needed:
             return
         path = file_path(self.directory / stream, first_number)
-        with path.open("rb") as file:
+        with _opened(path, needed) as file:
             self.read_counts.files += 1
             for chunk in needed:
                 self.read_counts.chunks += 1
                 yield from _events(_chunk_data(file, path, chunk), stream, chunk.number, channels, wanted)
+
+    def _channels(self, stream: str, first_number: int) -> dict[int, ChannelKey]:
+        return self._asked(stream, lambda catalog: catalog.channels(stream, first_number))
 
     def streams(self) -> tuple[str, ...]:
         """The names of all streams that hold an event, sorted."""
@@ -173,7 +202,43 @@ class McapLog:
 
     def next_number(self, stream: str) -> int:
         """The number the next appended event will get; 0 for an unknown stream."""
-        return self._asked(stream, lambda catalog: catalog.next_number(stream))
+        absent = max((absence.stop_number for absence in self.absences(stream)), default=0)
+        return max(self._asked(stream, lambda catalog: catalog.next_number(stream)), absent)
+
+    def begins_at(self, stream: str) -> int:
+        """The number of the oldest event of a stream; what came before it is retained away or lost."""
+        first = self._asked(stream, lambda catalog: catalog.first_number(stream))
+        return self.next_number(stream) if first is None else first
+
+    def absences(self, stream: str) -> tuple[Absence, ...]:
+        """What of a stream is not there any more, and why, by number. Raises LogDamaged where the record is."""
+        folder = self.directory / valid_stream(stream)
+        try:
+            state = (folder / ABSENCES_NAME).stat()
+        except FileNotFoundError:
+            return ()
+        mark = (state.st_ino, state.st_mtime_ns)
+        if stream not in self._absences or self._absences[stream][0] != mark:
+            self._absences[stream] = (mark, recorded_absences(folder))
+        return self._absences[stream][1]
+
+    def end_aged(self, now_ns: int) -> tuple[str, ...]:
+        """The streams whose file was ended because it was open for the rotation's age. Raises AppendFailed."""
+        with self._lock:
+            open_streams = [(stream, self._append_locks[stream]) for stream in self._writers]
+        ended = []
+        for stream, own in open_streams:
+            with own:
+                if stream in self._writers and self._end_aged(stream, now_ns):
+                    ended.append(stream)
+        return tuple(ended)
+
+    def _end_aged(self, stream: str, now_ns: int) -> bool:
+        try:
+            return self._writers[stream].end_aged(now_ns)
+        except BaseException:
+            del self._writers[stream]
+            raise
 
     def boots(self, stream: str) -> tuple[LoggedBoot, ...]:
         """The boots with events in a stream, in order of time, from the catalog; to within the chunks they are in."""
@@ -234,6 +299,15 @@ def _damages(files: Sequence[CatalogFile], number: int) -> dict[int, str]:
         for file, end in zip(files, ends, strict=False)  # no file, no end: an unknown stream holds nothing
         if file.damage and end > number
     }
+
+
+def _opened(path: Path, chunks: Sequence[CatalogChunk]) -> BinaryIO:
+    """The file, to be read. Raises LogDamaged where it is gone."""
+    try:
+        return path.open("rb")
+    except FileNotFoundError as error:
+        span = f"numbers {chunks[0].number} to {chunks[-1].number + chunks[-1].count - 1}"
+        raise LogDamaged(f"{path}: {span} were taken away while the stream was read") from error
 
 
 def _chunk_data(file: BinaryIO, path: Path, chunk: CatalogChunk) -> bytes:

@@ -3,7 +3,9 @@
 import threading
 from collections.abc import Iterator, Sequence
 
-from trigpoint.events.codec import Event
+import numpy as np
+
+from trigpoint.events.codec import Event, schema_name
 from trigpoint.events.envelope import Envelope, LogPosition
 from trigpoint.events.runs import EncodedRun, envelopes
 from trigpoint.logs.channels import packed_rows
@@ -47,6 +49,20 @@ class MemoryLog:
             if not early and not late and (kinds is None or isinstance(row.event, tuple(kinds))):
                 yield LoggedEvent(LogPosition(stream, number), row)
 
+    def read_headers(self, stream: str) -> Iterator[EncodedRun]:
+        """Identities, schemas and times of the events that are there, each a run of one."""
+        for row in self.read(stream):
+            identity, stamp_ns = row.envelope.identity, row.envelope.stamp_ns
+            yield EncodedRun(
+                source=identity.source,
+                boot_id=identity.boot_id,
+                schemas=(schema_name(type(row.envelope.event)),),
+                schema_of_row=np.zeros(1, dtype=np.int64),
+                sequences=np.array([identity.sequence], dtype=np.int64),
+                stamps_ns=np.array([stamp_ns], dtype=np.int64),
+                payloads=(),
+            )
+
     def streams(self) -> tuple[str, ...]:
         """The names of all streams that hold an event, sorted."""
         with self._lock:
@@ -55,6 +71,10 @@ class MemoryLog:
     def next_number(self, stream: str) -> int:
         """The number the next appended event will get."""
         return len(self._streams.get(stream, []))
+
+    def begins_at(self, stream: str) -> int:
+        """The number of the oldest event: 0, since nothing is ever taken away."""
+        return 0
 
     def boots(self, stream: str) -> tuple[LoggedBoot, ...]:
         """The boots with events in a stream, in order of time."""

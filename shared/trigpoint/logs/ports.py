@@ -52,9 +52,20 @@ class EventLog(Protocol):
     def next_number(self, stream: str) -> int:
         """The number the next appended event will get; 0 for an unknown stream."""
 
+    def begins_at(self, stream: str) -> int:
+        """The number of the oldest event of a stream: not 0 where older ones were retained away; the next number
+        where there is none."""
+
     def boots(self, stream: str) -> tuple[LoggedBoot, ...]:
         """The boots with events in a stream, in order of time; no event is read for it, and the range may be wider than
         the events'."""
 
     def close(self) -> None:
         """Everything flushed, files closed with their index."""
+
+
+class RecallingLog(EventLog, Protocol):
+    """An EventLog that also tells who said what when without a look at what was said."""
+
+    def read_headers(self, stream: str) -> Iterator[EncodedRun]:
+        """Identities, schemas and times of all events of a stream, in order, as runs without payloads."""

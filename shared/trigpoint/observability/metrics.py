@@ -32,6 +32,7 @@ class Instruments:
         self.accepted = self._counter("accepted", "Events accepted.", "vehicle")
         self.duplicates = self._counter("duplicates", "Messages that were there already.", "vehicle")
         self.rejected = self._counter("rejected", "Messages refused and kept aside, by reason.", "vehicle", "reason")
+        self.throttled = self._counter("throttled", "Messages beyond a vehicle's rate, not taken.", "vehicle")
         self.sequence_gaps = self._counter("sequence_gaps", "Gaps seen in sequence numbers.", "vehicle")
         self.bus_lost = self._counter("bus_lost", "Messages dropped because a queue was full.")
         self.restarts = self._counter("restarts", "Times a supervised service was started anew.", "name")

@@ -3,11 +3,13 @@
 import random
 from dataclasses import dataclass
 
+import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
 from trigpoint.events.envelope import EventIdentity
-from trigpoint_ingest.core.ordering import DESCRIPTION_SCHEMA, HELD_LIMIT, SequenceOrder, described_first
+from trigpoint.events.runs import EncodedRun
+from trigpoint_ingest.core.ordering import DESCRIPTION_SCHEMA, HELD_LIMIT, RunOrder, described_first
 
 
 @dataclass(frozen=True)
@@ -26,43 +28,82 @@ def description(sequence: int, *, vehicle: str = "a") -> Message:
     return Message(EventIdentity(vehicle, "boot", sequence), DESCRIPTION_SCHEMA)
 
 
-def sequences(messages: list[object]) -> list[int]:
-    return [message.identity.sequence for message in messages]  # type: ignore[attr-defined]
+def run(*numbers: int) -> EncodedRun:
+    return EncodedRun(
+        source="a",
+        boot_id="boot",
+        schemas=("trigpoint.v1.ImuMeasured",),
+        schema_of_row=np.zeros(len(numbers), dtype=np.int64),
+        sequences=np.array(numbers, dtype=np.int64),
+        stamps_ns=np.array(numbers, dtype=np.int64) * 10,
+        payloads=[str(number).encode() for number in numbers],
+    )
+
+
+def numbers(released: EncodedRun | None) -> list[int]:
+    """The sequences of a run whose rows still belong together."""
+    if released is None:
+        return []
+    found: list[int] = released.sequences.tolist()
+    assert (released.stamps_ns == released.sequences * 10).all()
+    assert list(released.payloads) == [str(number).encode() for number in found]
+    return found
 
 
 @given(seed=st.integers(0, 2**32), count=st.integers(0, 50))
 def test_any_permutation_comes_out_in_order(seed: int, count: int) -> None:
-    order = SequenceOrder(next_sequence=0, capacity=count)
-    shuffled = [numbered(sequence) for sequence in range(count)]
+    order = RunOrder(next_sequence=0, capacity=count)
+    shuffled = list(range(count))
     random.Random(seed).shuffle(shuffled)
-    released = [message for arrived in shuffled for message in order.offer(arrived)]
-    assert sequences(list(released)) == list(range(count))
+    released = [order.offer([run(number)]).following for number in shuffled]
+    assert [number for part in released for number in numbers(part)] == list(range(count))
+
+
+@given(st.lists(st.lists(st.integers(0, 30), min_size=1), min_size=1))
+def test_whatever_comes_goes_on_once_in_order_or_waits(arrivals: list[list[int]]) -> None:
+    order = RunOrder(next_sequence=0, capacity=100)
+    released = [order.offer([run(*arrival)]) for arrival in arrivals]
+    came = {number for arrival in arrivals for number in arrival}
+    first_missing = min(set(range(32)) - came)
+    assert [number for one in released for number in numbers(one.following)] == list(range(first_missing))
+    assert order.held == len({number for number in came if number > first_missing})
+    assert (order.awaited, order.overflowed) == (first_missing, 0)
 
 
 def test_what_was_sent_before_goes_on_at_once() -> None:
-    order = SequenceOrder(next_sequence=5, capacity=10)
-    assert sequences(list(order.offer(numbered(3)))) == [3]
+    order = RunOrder(next_sequence=5, capacity=10)
+    released = order.offer([run(3)])
+    assert (numbers(released.again), released.following) == ([3], None)
+
+
+def test_of_a_number_that_comes_twice_together_one_goes_on() -> None:
+    released = RunOrder(next_sequence=0, capacity=10).offer([run(0, 1), run(1, 2)])
+    assert (numbers(released.following), released.doubled) == ([0, 1, 2], 1)
 
 
 def test_a_later_message_waits_for_the_missing_one() -> None:
-    order = SequenceOrder(next_sequence=0, capacity=10)
-    assert order.offer(numbered(1)) == []
-    assert order.held == 1
+    order = RunOrder(next_sequence=0, capacity=10)
+    released = order.offer([run(1)])
+    assert (released.again, released.following, order.held) == (None, None, 1)
 
 
 def test_what_finds_no_room_is_dropped_and_counted() -> None:
-    order = SequenceOrder(next_sequence=0, capacity=2)
-    for sequence in (1, 2, 3):
-        order.offer(numbered(sequence))
+    order = RunOrder(next_sequence=0, capacity=2)
+    order.offer([run(3, 1, 2)])
     assert (order.held, order.overflowed) == (2, 1)
+    assert numbers(order.offer([run(0)]).following) == [0, 1, 2]
 
 
 def test_giving_up_releases_what_waits_in_order_and_goes_on_behind_it() -> None:
-    order = SequenceOrder(next_sequence=0, capacity=10)
-    for sequence in (4, 2):
-        order.offer(numbered(sequence))
-    assert sequences(list(order.give_up())) == [2, 4]
-    assert sequences(list(order.offer(numbered(5)))) == [5]
+    order = RunOrder(next_sequence=0, capacity=10)
+    order.offer([run(4), run(2)])
+    assert numbers(order.give_up()) == [2, 4]
+    assert numbers(order.offer([run(5)]).following) == [5]
+
+
+def test_giving_up_with_nothing_waiting_changes_nothing() -> None:
+    order = RunOrder(next_sequence=3, capacity=10)
+    assert (order.give_up(), order.awaited) == (None, 3)
 
 
 def test_a_files_messages_follow_their_drives_description() -> None:
