@@ -5,7 +5,8 @@ from pathlib import Path
 
 import click
 
-from trigpoint.logs.verification import FileSummary, Finding, Verification, verify
+from trigpoint.logs.findings import FileSummary, Finding
+from trigpoint.logs.verification import Verification, verify
 from trigpoint_cli.data_dir import LOG_NAME
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering
 

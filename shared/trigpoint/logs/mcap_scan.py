@@ -70,14 +70,14 @@ class McapScan:
         self.finished = False  # the data section has its end
         self.whole_end = 0  # where the last whole chunk ends, in bytes
         self._checksums_required = False
-        self._summary_fault = "no summary was read"
+        self.summary_fault = "no summary was read"  # "" for a whole one
         self._channels_settled = False  # by the summary
         self._lost_chunk = False  # the last chunk was damaged: its message indexes tell its count
 
     @property
     def complete(self) -> bool:
         """The file has its end and its summary; its data section may be damaged all the same."""
-        return self.finished and not self._summary_fault
+        return self.finished and not self.summary_fault
 
     @property
     def torn_tail(self) -> bool:
@@ -94,7 +94,7 @@ class McapScan:
         """Every whole chunk, in the order of the file. A message outside of chunks counts as its own."""
         with FileBytes(self.path) as content:
             self._checksums_required = _is_our_own(content)
-            self._summary_fault = self._read_summary(content)
+            self.summary_fault = self._read_summary(content)
             offset = self._start(content)
             while not self.finished and offset < content.size_bytes:
                 following = self._following(content, offset)
@@ -203,8 +203,8 @@ class McapScan:
         if said != held and (said or self._checksums_required) and not self.damages:
             self._damaged(offset, f"data section has checksum {held:08x}, its end says {said:08x}", lost=0)
         self.finished = True
-        if self._summary_fault:
-            self._damaged(following, self._summary_fault, lost=0)
+        if self.summary_fault:
+            self._damaged(following, self.summary_fault, lost=0)
 
     def _read_summary(self, content: FileBytes) -> str:
         """What is wrong with the summary, "" if nothing; channels as it names them then."""

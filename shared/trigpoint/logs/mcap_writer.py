@@ -4,6 +4,7 @@ import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
@@ -130,8 +131,15 @@ def _chunk_index(
 class McapFileWriter:
     """One MCAP file being written; bytes reach the output with each `append` and with `finish`."""
 
-    def __init__(self, output: Output, *, metadata: Mapping[str, Mapping[str, str]]) -> None:
-        self._output = output
+    def __init__(
+        self,
+        output: Output,
+        *,
+        metadata: Mapping[str, Mapping[str, str]],
+        schemas: Mapping[str, bytes] = MappingProxyType({}),
+    ) -> None:
+        """`schemas`: descriptors by name, for those that may be unknown here."""
+        self._output, self._schemas = output, schemas
         self._index = FileIndex()
         self._data_crc = 0
         self._channel_ids: dict[ChannelKey, int] = {}
@@ -197,7 +205,8 @@ class McapFileWriter:
 
     def _add_schema(self, name: str, builder: RecordBuilder) -> int:
         schema_id = len(self._schema_ids) + 1
-        schema = Schema(id=schema_id, data=schema_data(name), encoding=ENCODING, name=name)
+        data = self._schemas[name] if name in self._schemas else schema_data(name)
+        schema = Schema(id=schema_id, data=data, encoding=ENCODING, name=name)
         self._schema_ids[name] = schema_id
         self._index.schemas[schema_id] = schema
         schema.write(builder)

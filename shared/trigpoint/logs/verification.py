@@ -1,38 +1,20 @@
 """Whether log files are as they were written, and what is in them."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from trigpoint.errors import InputError
+from trigpoint.errors import InputError, LogDamaged
 from trigpoint.events.seen import SeenSequences
+from trigpoint.logs.absences import NAME as ABSENCES_NAME
+from trigpoint.logs.absences import Absence, recorded_absences, uncovered
+from trigpoint.logs.catalog_verification import catalog_findings
 from trigpoint.logs.channels import ChannelKey
 from trigpoint.logs.chunks import ChunkMessage, messages
-from trigpoint.logs.log_files import SUFFIX, file_numbers
+from trigpoint.logs.findings import FileSummary, Finding, TopicSummary
+from trigpoint.logs.log_files import SUFFIX, file_numbers, file_path
 from trigpoint.logs.mcap_scan import UNKNOWN, McapScan
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """Something wrong with a file. `kind` is one of "damaged", "unfinished" (its writer died, or still writes),
-    "number gap", "repeated identity", "unknown channel"; `lost_messages` -1 where it cannot be told."""
-
-    path: Path
-    offset: int
-    kind: str
-    detail: str
-    lost_messages: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class TopicSummary:
-    """The messages of one topic in a file, and the times [start, end] they span."""
-
-    topic: str
-    schema_name: str
-    count: int
-    start_ns: int
-    end_ns: int
+from trigpoint.logs.seals import is_sealed, orphan_seals, seal_fault
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,46 +29,33 @@ class BootSummary:
 
 
 @dataclass(frozen=True, slots=True)
-class FileSummary:
-    """What the whole part of a file holds. Times [start, end] are 0 for an empty one."""
-
-    path: Path
-    stream: str
-    size_bytes: int
-    count: int
-    start_ns: int
-    end_ns: int
-    vehicles: tuple[str, ...]
-    topics: tuple[TopicSummary, ...]
-    metadata: Mapping[str, Mapping[str, str]]
-
-
-@dataclass(frozen=True, slots=True)
 class Verification:
     """The files looked at and all that is wrong with them; nothing is if `findings` is empty."""
 
     files: tuple[FileSummary, ...]
     boots: tuple[BootSummary, ...]
     findings: tuple[Finding, ...]
+    absences: tuple[tuple[str, Absence], ...] = ()  # by stream, what is recorded as gone: nothing wrong
 
 
 @dataclass(slots=True)
 class _Tally:
-    """Stamps by channel while a file is read."""
+    """Count and times [start, end] of each channel's messages while a file is read."""
 
-    stamps_ns: dict[int, list[int]] = field(default_factory=dict)
+    spans: dict[int, tuple[int, int, int]] = field(default_factory=dict)
 
     def add(self, channel_id: int, stamp_ns: int) -> None:
-        self.stamps_ns.setdefault(channel_id, []).append(stamp_ns)
+        count, start_ns, end_ns = self.spans.get(channel_id, (0, stamp_ns, stamp_ns))
+        self.spans[channel_id] = (count + 1, min(start_ns, stamp_ns), max(end_ns, stamp_ns))
 
     def topics(self, channels: Mapping[int, ChannelKey]) -> tuple[TopicSummary, ...]:
-        grouped: dict[tuple[str, str], list[int]] = {}
-        for channel_id, stamps_ns in self.stamps_ns.items():
+        grouped: dict[tuple[str, str], list[tuple[int, int, int]]] = {}
+        for channel_id, span in self.spans.items():
             key = channels[channel_id]
-            grouped.setdefault((key.topic, key.schema_name), []).extend(stamps_ns)
+            grouped.setdefault((key.topic, key.schema_name), []).append(span)
         return tuple(
-            TopicSummary(*name, len(stamps_ns), min(stamps_ns), max(stamps_ns))
-            for name, stamps_ns in sorted(grouped.items())
+            TopicSummary(*name, sum(one[0] for one in own), min(one[1] for one in own), max(one[2] for one in own))
+            for name, own in sorted(grouped.items())
         )
 
 
@@ -96,6 +65,7 @@ class _Verifier:
     def __init__(self) -> None:
         self.seen = SeenSequences()
         self.findings: list[Finding] = []
+        self.absences: list[tuple[str, Absence]] = []
 
     def file(self, path: Path, stream: str) -> FileSummary:
         scan, tally = McapScan(path), _Tally()
@@ -111,7 +81,7 @@ class _Verifier:
             count=sum(topic.count for topic in topics),
             start_ns=min((topic.start_ns for topic in topics), default=0),
             end_ns=max((topic.end_ns for topic in topics), default=0),
-            vehicles=tuple(sorted({scan.channels[number].vehicle for number in tally.stamps_ns} - {""})),
+            vehicles=tuple(sorted({scan.channels[number].vehicle for number in tally.spans} - {""})),
             topics=topics,
             metadata=scan.metadata,
         )
@@ -133,15 +103,39 @@ class _Verifier:
             Finding(scan.path, damage.offset, kind, damage.reason, damage.lost_messages) for damage in scan.damages
         ]
 
-    def numbers(self, files: Iterable[FileSummary]) -> None:
-        """Files of a stream follow one another without gap: each begins where the one before ended."""
+    def stream(self, folder: Path, files: Sequence[FileSummary]) -> None:
+        """Files of a stream follow one another: each begins where the one before ended, or what lies between is
+        recorded as gone; seals hold, and no sealed file is missing."""
+        absences = self._recorded(folder)
         expected = 0
         for file in files:
             first = int(file.path.stem)
-            if first != expected:
-                detail = f"first event has number {first}, expected {expected}"
-                self.findings.append(Finding(file.path, 0, "number gap", detail, max(first - expected, UNKNOWN)))
+            gaps = uncovered([(expected, first)], absences) if expected <= first else ((expected, first),)
+            if gaps:
+                detail = f"first event has number {first}, expected {gaps[0][0]}"
+                lost = max(sum(stop - start for start, stop in gaps), UNKNOWN)
+                self.findings.append(Finding(file.path, 0, "number gap", detail, lost))
             expected = first + file.count
+        self._seals(folder, absences)
+
+    def _recorded(self, folder: Path) -> tuple[Absence, ...]:
+        try:
+            absences = recorded_absences(folder)
+        except LogDamaged as error:
+            self.findings.append(Finding(folder / ABSENCES_NAME, 0, "damaged", str(error)))
+            return ()
+        self.absences += [(folder.name, absence) for absence in absences]
+        return absences
+
+    def _seals(self, folder: Path, absences: Sequence[Absence]) -> None:
+        for path in [file_path(folder, number) for number in file_numbers(folder)]:
+            fault = seal_fault(path) if is_sealed(path) else ""
+            if fault:
+                self.findings.append(Finding(path, 0, "broken seal", fault))
+        for path in orphan_seals(folder):
+            number = int(path.stem) if path.stem.isdecimal() else 0
+            if uncovered([(number, number + 1)], absences):
+                self.findings.append(Finding(path, 0, "missing file", "was sealed and is gone", UNKNOWN))
 
     def boots(self) -> tuple[BootSummary, ...]:
         return tuple(self._boot(source, boot_id) for source, boot_id in sorted(self.seen.boots()))
@@ -161,11 +155,12 @@ def verify(path: Path) -> Verification:
     for folder, numbered in _folders(path):
         summaries = [verifier.file(file, folder.name if numbered else file.stem) for file in _files(path, folder)]
         if numbered:
-            verifier.numbers(summaries)
+            verifier.stream(folder, summaries)
         files += summaries
-    if not files:
+    verifier.findings += catalog_findings(path, files)
+    if not files and not verifier.absences:
         raise InputError(f"{path}: no {SUFFIX} file there")
-    return Verification(tuple(files), verifier.boots(), tuple(verifier.findings))
+    return Verification(tuple(files), verifier.boots(), tuple(verifier.findings), tuple(verifier.absences))
 
 
 def _folders(path: Path) -> list[tuple[Path, bool]]:
@@ -175,7 +170,9 @@ def _folders(path: Path) -> list[tuple[Path, bool]]:
     if not path.is_dir():
         raise InputError(f"{path}: no such file or directory")
     within = [
-        folder for folder in (path, *sorted(path.iterdir())) if folder.is_dir() and any(folder.glob(f"*{SUFFIX}"))
+        folder
+        for folder in (path, *sorted(path.iterdir()))
+        if folder.is_dir() and (any(folder.glob(f"*{SUFFIX}")) or (folder / ABSENCES_NAME).exists())
     ]
     return [(folder, len(file_numbers(folder)) == len(list(folder.glob(f"*{SUFFIX}")))) for folder in within]
 

@@ -8,10 +8,11 @@ from event_examples.one_each import ONE_OF_EACH
 from event_examples.rows import START_NS, STEP_NS, fix_row, imu_row, imu_rows
 from trigpoint.errors import InputError
 from trigpoint.events.corrected import AnchorLabelled
+from trigpoint.logs.findings import TopicSummary
 from trigpoint.logs.mcap_log import McapLog
 from trigpoint.logs.stream_writer import Rotation
 from trigpoint.logs.vehicle_log import write_vehicle_log
-from trigpoint.logs.verification import TopicSummary, verify
+from trigpoint.logs.verification import verify
 
 STREAM = "veh-van"
 
@@ -69,8 +70,15 @@ def test_missing_sequences_are_counted(tmp_path: Path) -> None:
 
 def test_a_missing_file_of_a_stream_is_found(directory: Path) -> None:
     (directory / STREAM / "000000000010.mcap").unlink()
+    gap, missing = verify(directory).findings
+    assert (gap.kind, gap.detail) == ("number gap", "first event has number 20, expected 10")
+    assert (missing.kind, missing.path.name, missing.lost_messages) == ("missing file", "000000000010.mcap", 10)
+
+
+def test_a_missing_last_file_is_found_by_the_catalog(directory: Path) -> None:
+    (directory / STREAM / "000000000020.mcap").unlink()
     (finding,) = verify(directory).findings
-    assert (finding.kind, finding.detail) == ("number gap", "first event has number 20, expected 10")
+    assert (finding.kind, finding.path.name, finding.lost_messages) == ("missing file", "000000000020.mcap", 10)
 
 
 def test_an_identity_that_is_there_twice_is_found(tmp_path: Path) -> None:
