@@ -8,6 +8,7 @@ from enum import StrEnum
 from typing import Any
 
 from trigpoint.observability.endpoint import Status
+from trigpoint.observability.masking import without_password
 from trigpoint.observability.metrics import Instruments
 from trigpoint.observability.running import Service
 
@@ -80,5 +81,5 @@ class ServedService(threading.Thread):
     def _details(self) -> Mapping[str, Any]:
         details = {"service": self._instruments.service, "stage": self.stage.value}
         if self.error is not None:
-            details["error"] = str(self.error)
+            details["error"] = without_password(str(self.error))
         return {**details, "up_s": round(time.monotonic() - self._began_s, 1)}

@@ -1,6 +1,7 @@
 """Settings built from what was given, checked as a whole: everything that is wrong is said at once."""
 
 import json
+import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -99,13 +100,20 @@ def _value(given: Given, kind: object) -> object:
     """The value as its key's type. Raises InputError with the limit it breaks."""
     adapter: TypeAdapter[object] = TypeAdapter(kind)  # type: ignore[arg-type]  # a field's type, Annotated or not
     try:
-        if not given.is_text:
-            return adapter.validate_json(json.dumps(given.value), strict=True)
-        return _of_text(str(given.value), adapter)
+        if given.is_text:
+            return _measured(_of_text(str(given.value), adapter))
+        return _measured(adapter.validate_json(json.dumps(given.value), strict=True))
     except TypeError as error:
         raise InputError(f"a {type(given.value).__name__} is no value of any key") from error
     except ValidationError as error:
         raise InputError(_limits(error)) from error
+
+
+def _measured(value: object) -> object:
+    """The value, if it is no number or one that settings hold: each is a size, a duration, a count or a share."""
+    if isinstance(value, int | float) and not 0 <= value < math.inf:
+        raise InputError("should be a finite number of at least 0")
+    return value
 
 
 def _of_text(text: str, adapter: TypeAdapter[object]) -> object:

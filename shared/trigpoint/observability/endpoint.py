@@ -2,6 +2,7 @@
 
 import json
 import logging
+import socket
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -113,6 +114,7 @@ class _Server(ThreadingMixIn, TCPServer):
 
     def __init__(self, settings: EndpointSettings, health: Health) -> None:
         self.settings, self.health = settings, health
+        self.address_family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
         self._room = threading.BoundedSemaphore(settings.parallel_limit)
         super().__init__((settings.host, settings.port), _Handler)
 
@@ -147,7 +149,7 @@ class Endpoint:
     def address(self) -> str:
         """Where it answers."""
         host, port = self._server.server_address[:2]
-        return f"http://{host!s}:{port}"
+        return f"http://[{host!s}]:{port}" if ":" in str(host) else f"http://{host!s}:{port}"
 
     def close(self) -> None:
         """No more requests; again: no effect."""

@@ -51,7 +51,8 @@ class LineFormatter(logging.Formatter):
             return json.dumps({name: self._clean(value) for name, value in values.items()}, default=str)
         more = " ".join(f"{name}={value}" for name, value in list(values.items())[5:])
         head = f"{values['time']} {values['level']} {self._service} {values['logger']}: {values['message']}"
-        return self._secrets.masked(" ".join(f"{head} {more}".split()))
+        line = " ".join(f"{head} {more}".split())
+        return self._secrets.masked("".join(one if one.isprintable() else "?" for one in line))
 
     def _values(self, record: logging.LogRecord) -> dict[str, object]:
         values: dict[str, object] = {
@@ -69,6 +70,8 @@ class LineFormatter(logging.Formatter):
     def _clean(self, value: object) -> object:
         if isinstance(value, bool | int | float) or value is None:
             return value
+        if isinstance(value, list | tuple):
+            return [self._clean(item) for item in value]
         return self._secrets.masked(str(value))
 
 

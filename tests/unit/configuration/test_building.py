@@ -186,3 +186,9 @@ def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
 def test_a_key_outside_of_a_section_is_refused(tmp_path: Path) -> None:
     (line,) = refused(tmp_path, "port = 1\n" + FOLDER)
     assert line.startswith("port: stands in no section")
+
+
+@pytest.mark.parametrize("number", ["-1", "inf", "nan", "-inf"])
+def test_a_number_without_a_limit_of_its_own_is_finite_and_not_negative(tmp_path: Path, number: str) -> None:
+    expected = f"[work] inner.gate_sigmas = '{number}': should be a finite number of at least 0 (flag --set)"
+    assert refused(tmp_path, FOLDER, f"work.inner.gate_sigmas={number}") == (expected,)

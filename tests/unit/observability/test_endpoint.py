@@ -122,3 +122,8 @@ def test_a_request_line_without_end_is_refused() -> None:
 def test_a_port_that_is_taken_is_named() -> None:
     with answering(Patient()) as (host, port), pytest.raises(ServiceError, match=f"{host}:{port}: Address already"):
         Endpoint(EndpointSettings(host=host, port=port), Patient())
+
+
+def test_an_address_of_ipv6_is_one_too() -> None:
+    with Endpoint(EndpointSettings(host="::1", port=0), Patient()) as endpoint:
+        assert endpoint.address.startswith("http://[::1]:")

@@ -65,3 +65,11 @@ def test_a_secret_too_short_to_be_one_does_not_mask_every_line() -> None:
     secrets = Secrets()
     secrets.add("a")
     assert secrets.masked("a map") == "a map"
+
+
+def test_a_plain_record_sends_no_control_characters_to_a_terminal() -> None:
+    assert line({"msg": "vehicle \x1b[2J"}, form="plain").endswith("vehicle ?[2J")
+
+
+def test_a_list_stays_one() -> None:
+    assert json.loads(line({"msg": "x", "running": ["a", "b"]}))["running"] == ["a", "b"]
