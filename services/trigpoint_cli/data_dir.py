@@ -106,3 +106,7 @@ data_option: Callable[[Any], Any] = click.option(
     callback=_directory,
     help="The data directory.",
 )
+
+as_of_option: Callable[[Any], Any] = click.option(
+    "--as-of", type=int, metavar="VERSION", help="The map version, the newest by default."
+)

@@ -9,9 +9,10 @@ import click
 
 from trigpoint.errors import InputError
 from trigpoint.events.mapped import TrajectorySolved
+from trigpoint.logs.as_of import log_as_of
 from trigpoint.logs.readings import logged_verdicts
 from trigpoint_cli.build import EDGES, METHODS
-from trigpoint_cli.data_dir import DataDirectory, data_option
+from trigpoint_cli.data_dir import DataDirectory, as_of_option, data_option
 from trigpoint_cli.kept_solves import joint_covariance_m2, kept_solve
 from trigpoint_cli.leave_out import leave_out
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering, metres
@@ -158,13 +159,15 @@ def _gnss_line(name: str, one: GnssEvaluation) -> str:
 @command.command("truth")
 @data_option
 @click.option("--truth", "truth_path", required=True, type=click.Path(path_type=Path), metavar="FILE")
+@as_of_option
 @answering
-def truth(data: DataDirectory, truth_path: Path, *, screen: Screen) -> Answer:
-    """Measure the newest map version against truth; nothing is aligned first."""
+def truth(data: DataDirectory, truth_path: Path, as_of: int | None, *, screen: Screen) -> Answer:
+    """Measure a map version against truth; nothing is aligned first."""
     known = read_truth(truth_path)
     with data.opened_log() as log:
-        solved, verdicts = logged_map(log), logged_verdicts(log)
-        inputs = read_inputs(log, screen)
+        solved = logged_map(log, as_of=as_of)
+        read = log_as_of(log, solved)
+        inputs, verdicts = read_inputs(read, screen), logged_verdicts(read)
     evaluated = Evaluated(solved=solved, frame=inputs.frame, drives=inputs.drives, verdicts=verdicts)
     joint_m2 = joint_covariance_m2(kept_solve(data, solved.head.map_version), solved)
     found = evaluate_truth(evaluated, known, joint_covariance_m2=joint_m2)

@@ -6,7 +6,7 @@ import click
 
 from trigpoint.errors import InputError
 from trigpoint.landmarks.queries import LandmarkQuery
-from trigpoint_cli.data_dir import DataDirectory, data_option
+from trigpoint_cli.data_dir import DataDirectory, as_of_option, data_option
 from trigpoint_cli.output import Answer, Screen, answering, plain
 from trigpoint_landmarks.core.questions import bbox_of, near_of
 from trigpoint_landmarks.core.rendering import feature_collection, landmark_list
@@ -18,7 +18,7 @@ from trigpoint_landmarks.core.rendering import feature_collection, landmark_list
 @click.option("--near", metavar="LAT,LON", help="Only near this position, in degrees; nearest first.")
 @click.option("--radius-m", type=float, metavar="R", help="How near, in metres on the ground; goes with --near.")
 @click.option("--kind", help="Only of this kind.")
-@click.option("--as-of", type=int, metavar="VERSION", help="The map version, the newest by default.")
+@as_of_option
 @click.option("--limit", type=int, metavar="N", help="At most so many.")
 @click.option("--geojson", is_flag=True, help="A GeoJSON FeatureCollection instead.")
 @answering

@@ -9,9 +9,10 @@ import click
 
 from trigpoint.errors import InputError
 from trigpoint.events.solved import LabelReduction
+from trigpoint.logs.as_of import log_as_of
 from trigpoint.logs.ports import EventLog
 from trigpoint.logs.readings import logged_anchors, logged_frame
-from trigpoint_cli.data_dir import DataDirectory, data_option
+from trigpoint_cli.data_dir import DataDirectory, as_of_option, data_option
 from trigpoint_cli.kept_solves import joint_covariance_m2, kept_of, kept_solve
 from trigpoint_cli.output import Answer, Screen, answering
 from trigpoint_cli.pipeline import Built, Inputs, read_inputs, settings_for, solve
@@ -44,37 +45,54 @@ SOFTWARE = ("trigpoint", "gtsam", "filterpy", "numpy", "scipy", "pyproj", "mcap"
 @click.option(
     "--truth", "truth_path", type=click.Path(path_type=Path), metavar="FILE", help="Truth to hold it against."
 )
+@as_of_option
 @answering
-def command(data: DataDirectory, truth_path: Path | None, *, screen: Screen) -> Answer:
-    """Write the report of the newest map version to report.html in the data directory."""
+def command(data: DataDirectory, truth_path: Path | None, as_of: int | None, *, screen: Screen) -> Answer:
+    """Write the report of the newest map version to report.html in the data directory.
+
+    Of version N, asked for by number, it is report-N.html.
+    """
     if truth_path is None and data.truth.is_file():
         truth_path = data.truth
+    path = report_path(data, as_of)
     with data.opened_log() as log:
-        write_report(data, log, screen, truth_path=truth_path)
-        map_version = logged_map(log).head.map_version
-    size = data.report.stat().st_size
-    values = {"report": str(data.report), "size_bytes": size, "map_version": map_version}
-    return Answer(values, (f"wrote {data.report}, {size / 1e6:.1f} MB",))
+        map_version = logged_map(log, as_of=as_of).head.map_version
+        write_report(data, log, screen, truth_path=truth_path, as_of=as_of)
+    size = path.stat().st_size
+    values = {"report": str(path), "size_bytes": size, "map_version": map_version}
+    return Answer(values, (f"wrote {path}, {size / 1e6:.1f} MB",))
+
+
+def report_path(data: DataDirectory, as_of: int | None) -> Path:
+    """Where the report of a map version stands, None for the newest."""
+    return data.report if as_of is None else data.report.with_stem(f"{data.report.stem}-{as_of}")
 
 
 def write_report(
-    data: DataDirectory, log: EventLog, screen: Screen, *, truth_path: Path | None, built: Built | None = None
+    data: DataDirectory,
+    log: EventLog,
+    screen: Screen,
+    *,
+    truth_path: Path | None,
+    built: Built | None = None,
+    as_of: int | None = None,
 ) -> TruthEvaluation | None:
-    """The report in its place, and the evaluation against truth where there is truth.
+    """A map version's report in its place, and the evaluation against truth where there is truth.
 
     `built` is the newest map version where it was just built. What was not kept of it is solved again.
     """
-    solved, estimates = logged_map(log), logged_estimates(log)
+    solved = logged_map(log, as_of=as_of)
+    read = log_as_of(log, solved)
+    estimates = logged_estimates(read)
     if built is None:
-        inputs = read_inputs(log, screen)
+        inputs = read_inputs(read, screen)
     else:
         inputs = Inputs(frame=logged_frame(log), drives=built.drives, anchors=logged_anchors(log))
     kept = kept_solve(data, solved.head.map_version) if built is None else built.kept
     if kept is None and inputs.anchors:
         settings = settings_for("anchored", inputs.anchors)
-        kept = kept_of(
-            solve(inputs, settings, screen, verdicts=estimates.verdicts, what="solving for held-out anchors")
-        )
+        what = "solving for held-out anchors"
+        kept = kept_of(solve(inputs, settings, screen, verdicts=estimates.verdicts, what=what))
     evaluated = Evaluated(solved=solved, frame=inputs.frame, drives=inputs.drives, verdicts=estimates.verdicts)
     joint_m2 = joint_covariance_m2(kept, solved)
     truth = None
@@ -91,7 +109,7 @@ def write_report(
     if kept is not None:
         content = _with_reduction(content, kept.reduction, screen)
     with screen.part_of("writing the report") as progress:
-        _write(data.report, report_page(content, progress=progress))
+        _write(report_path(data, as_of), report_page(content, progress=progress))
     return truth
 
 

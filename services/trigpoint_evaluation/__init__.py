@@ -1,7 +1,8 @@
 """Says how good a map is: against withheld fixes, withheld labels and truth; and shows it in a report.
 
 Reads: VehicleDescribed, WheelSpeedMeasured, WheelPairMeasured, ImuMeasured, GnssFixReceived, LandmarksDetected,
-EventRefused, MapFramePinned, AnchorLabelled, FixJudged, PoseFiltered, GateAlarmed, TrajectorySolved,
+EventRefused, MapFramePinned, AnchorLabelled, AnchorRetracted, DriveExcluded, DriveIncluded, FixJudged, PoseFiltered,
+GateAlarmed, TrajectorySolved,
 LandmarkSolved, AnchorAssociated, ImageOffsetSolved, MapSolved
 Writes: (nothing)
 """

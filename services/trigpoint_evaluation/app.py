@@ -12,6 +12,7 @@ from trigpoint.errors import InputError
 from trigpoint.events.drives import Drive
 from trigpoint.events.estimated import Estimated, FixJudged, GateAlarmed, PoseFiltered
 from trigpoint.events.keys import STREAM_PATTERNS
+from trigpoint.events.names import NAMED_AT_MOST
 from trigpoint.events.observed import EventRefused
 from trigpoint.events.solved import SolvedMap
 from trigpoint.events.truth import Truth, truth_from_lines
@@ -64,12 +65,16 @@ class TruthEvaluation:
     gate: GateTruth
 
 
-def logged_map(log: EventLog) -> SolvedMap:
-    """The newest map version. Raises InputError where there is none."""
-    maps = logged_maps(log)
+def logged_map(log: EventLog, *, as_of: int | None = None) -> SolvedMap:
+    """A map version, the newest by default. Raises InputError where there is none, naming those nearest to it."""
+    maps = {one.head.map_version: one for one in logged_maps(log)}
     if not maps:
         raise InputError("the log holds no map version: build one first")
-    return maps[-1]
+    found = maps.get(max(maps) if as_of is None else as_of)
+    if found is None:
+        nearest = sorted(sorted(maps, key=lambda version: abs(version - (as_of or 0)))[:NAMED_AT_MOST])
+        raise InputError(f"map version {as_of} is unknown: the log has {len(maps)}, nearest {nearest}")
+    return found
 
 
 def logged_refusals(log: EventLog) -> tuple[EventRefused, ...]:

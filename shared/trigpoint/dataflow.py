@@ -69,18 +69,18 @@ class Flow:
 
 
 FLOWS: tuple[Flow, ...] = (
-    Flow(VehicleDescribed, INGEST, (FILTERING, OPTIMISATION, EVALUATION), sender=VEHICLE),
+    Flow(VehicleDescribed, INGEST, (FILTERING, OPTIMISATION, LANDMARKS, EVALUATION), sender=VEHICLE),
     Flow(WheelSpeedMeasured, INGEST, (FILTERING, OPTIMISATION, EVALUATION), sender=VEHICLE),
     Flow(WheelPairMeasured, INGEST, (FILTERING, OPTIMISATION, EVALUATION), sender=VEHICLE),
     Flow(ImuMeasured, INGEST, (FILTERING, OPTIMISATION, EVALUATION), sender=VEHICLE),
     Flow(GnssFixReceived, INGEST, (FILTERING, OPTIMISATION, EVALUATION), sender=VEHICLE),
-    Flow(LandmarksDetected, INGEST, (OPTIMISATION, EVALUATION), sender=VEHICLE),
+    Flow(LandmarksDetected, INGEST, (OPTIMISATION, LANDMARKS, EVALUATION), sender=VEHICLE),
     Flow(EventRefused, INGEST, (EVALUATION,)),
     Flow(MapFramePinned, INGEST, (FILTERING, OPTIMISATION, LANDMARKS, EVALUATION)),
     Flow(AnchorLabelled, INGEST, (OPTIMISATION, LANDMARKS, EVALUATION)),
-    Flow(AnchorRetracted, INGEST, (OPTIMISATION, LANDMARKS)),
-    Flow(DriveExcluded, INGEST, (OPTIMISATION,)),
-    Flow(DriveIncluded, INGEST, (OPTIMISATION,)),
+    Flow(AnchorRetracted, INGEST, (OPTIMISATION, LANDMARKS, EVALUATION)),
+    Flow(DriveExcluded, INGEST, (OPTIMISATION, LANDMARKS, EVALUATION)),
+    Flow(DriveIncluded, INGEST, (OPTIMISATION, LANDMARKS, EVALUATION)),
     Flow(FixJudged, FILTERING, (OPTIMISATION, EVALUATION)),
     Flow(PoseFiltered, FILTERING, (EVALUATION,)),
     Flow(GateAlarmed, FILTERING, (EVALUATION,)),

@@ -112,6 +112,57 @@ def test_geojson_is_one_feature_collection(campus: BuiltCampus) -> None:
     assert len(collection["features"]) == campus.built.answer["landmarks"]["count"]
 
 
+def test_a_landmark_is_explained_down_to_its_sweeps_in_the_log(campus: BuiltCampus) -> None:
+    anchored = [
+        one
+        for one in trigpoint("landmarks", "--data", campus.data, "--json").answer["landmarks"]["items"]
+        if one["anchored"]
+    ]
+    landmark = anchored[0]["landmark"]
+    said = trigpoint("explain", landmark, "--data", campus.data, "--json").answer
+    assert said["detections"] >= said["observations"]["count"] > 0 == said["observations"]["missing"]
+    assert {one["stream"] for one in said["observations"]["items"]} <= {"veh-vehicle-1", "veh-vehicle-2"}
+    assert {one["anchor"] for one in said["anchors"]} == set(anchored[0]["anchors"])
+    assert [one["event"] for one in said["corrections"]] == ["AnchorLabelled"] * len(said["anchors"])
+    assert trigpoint("explain", landmark, "--data", campus.data, "--as-of", 1).status == 0
+
+
+def test_a_version_asked_for_by_number_is_the_same_as_the_newest_one(campus: BuiltCampus) -> None:
+    words = ("evaluate", "truth", "--data", campus.data, "--truth", str(campus.written.truth), "--json")
+    named, newest = trigpoint(*words, "--as-of", 1).answer, trigpoint(*words).answer
+    assert named["error_m"] == newest["error_m"]
+
+
+@pytest.mark.parametrize(
+    "words", [("explain", "lm-1"), ("landmarks",), ("report",), ("evaluate", "truth")], ids=lambda words: words[0]
+)
+def test_an_unknown_version_ends_with_status_2_and_names_what_there_is(
+    campus: BuiltCampus, words: tuple[str, ...]
+) -> None:
+    truth = ("--truth", str(campus.written.truth)) if words[-1] == "truth" else ()
+    said = trigpoint(*words, "--data", campus.data, *truth, "--as-of", 9, "--json")
+    assert said.status == 2
+    assert "map version 9 is unknown" in said.answer["error"]
+    assert "1" in said.answer["error"].partition("unknown")[2]
+
+
+def test_what_people_corrected_is_listed_and_undone(campus: BuiltCampus, tmp_path: Path) -> None:
+    data = shutil.copytree(campus.data, tmp_path / "data")
+    excluded = trigpoint("drives", "exclude", "vehicle-2", "--data", data, "--reason", "loose", "--author", "ann")
+    assert excluded.status == 0
+    drives = trigpoint("drives", "list", "--data", data, "--json").answer["drives"]
+    assert [(one["vehicle"], one["excluded"], one["author"]) for one in drives["items"]] == [
+        ("vehicle-1", False, None),
+        ("vehicle-2", True, "ann"),
+    ]
+    assert trigpoint("drives", "include", "vehicle-2", "--data", data, "--json").answer["unchanged"] == 0
+    name = trigpoint("anchors", "list", "--data", data, "--json").answer["anchors"]["items"][0]["anchor"]
+    assert trigpoint("anchors", "retract", name, "--data", data, "--json").answer["retracted"][0]["anchor"] == name
+    assert trigpoint("anchors", "retract", name, "--data", data, "--json").answer["unchanged"] == 1
+    listed = trigpoint("anchors", "list", "--data", data, "--json").answer["anchors"]
+    assert (listed["count"], listed["in_force"]) == (LABELS, LABELS - 1)
+
+
 def test_replay_finds_no_difference(campus: BuiltCampus) -> None:
     said = trigpoint("replay", "--data", campus.data, "--json")
     assert (said.status, said.answer["differences"]) == (0, 0)

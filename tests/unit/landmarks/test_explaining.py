@@ -1,0 +1,169 @@
+"""What stands behind a landmark: every sweep, label and correction, with its place in the log."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import cast
+
+import pytest
+
+from solved_worlds.examples import Lap, World, world
+from solved_worlds.logged import append_world, drive_rows
+from trigpoint.errors import InputError
+from trigpoint.events.corrected import AnchorLabelled, AnchorRetracted, DriveExcluded
+from trigpoint.events.mapped import LandmarkSolved
+from trigpoint.events.observed import LandmarksDetected
+from trigpoint.landmarks.memory_store import MemoryStore
+from trigpoint.logs.mcap_log import McapLog
+from trigpoint.logs.memory_log import MemoryLog
+from trigpoint.logs.ports import EventLog
+from trigpoint.logs.readings import logged_maps
+from trigpoint_ingest.corrections import Attribution, exclude_drives, retract_anchor
+from trigpoint_landmarks.app import project
+from trigpoint_landmarks.core.explanation import Explanation
+from trigpoint_landmarks.explaining import explained
+from trigpoint_optimisation.app import build
+from trigpoint_optimisation.settings import OdometrySettings, SolveSettings
+
+SETTINGS = SolveSettings(method="anchored", odometry=OdometrySettings(keyframe_m=4.0))  # coarse: quick
+BY = Attribution(author="operator", reason="antenna came loose", stamp_ns=1)
+NEAR_M = 1.0  # range within 0.1 m, bearing within 0.005 rad, poses within some decimetres
+GROUP = 200  # events a chunk
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mapped:
+    """A log with two map versions, the second without the van and one label; a landmark both had to do with."""
+
+    log: MemoryLog
+    store: MemoryStore
+    landmark: LandmarkSolved
+    anchor: AnchorLabelled
+
+
+@pytest.fixture(scope="module")
+def block() -> World:
+    return world(Lap(duration_s=75.0), Lap(vehicle="van", begin_rad=3.5, seed=2, duration_s=50.0))
+
+
+@pytest.fixture(scope="module")
+def mapped(block: World) -> Mapped:
+    log, store = MemoryLog(), MemoryStore()
+    append_world(log, block)
+    build(log, SETTINGS)
+    (first,) = logged_maps(log)
+    landmark = next(
+        one
+        for one in first.landmarks
+        if one.anchors and one.vehicles == ("car", "van") and one.observations[0][0] == "car"
+    )
+    anchor = next(label for label in block.anchors if label.anchor == landmark.anchors[0])
+    exclude_drives(log, "van", boot_id=None, by=BY)
+    retract_anchor(log, anchor.anchor, image=anchor.image, by=BY)
+    build(log, SETTINGS)
+    project(log, store)
+    return Mapped(log=log, store=store, landmark=landmark, anchor=anchor)
+
+
+@pytest.fixture(scope="module")
+def first(mapped: Mapped) -> Explanation:
+    return explained(mapped.log, mapped.store, mapped.landmark.landmark, as_of=1)
+
+
+@pytest.fixture(scope="module")
+def second(mapped: Mapped) -> Explanation:
+    return explained(mapped.log, mapped.store, mapped.landmark.landmark)
+
+
+def test_every_observation_of_the_map_version_is_there(first: Explanation, mapped: Mapped) -> None:
+    seen = {(one.vehicle, one.boot_id, one.sequence) for one in first.sightings}
+    assert seen == set(mapped.landmark.observations)
+    assert (first.missing, first.map_version) == (0, 1)
+
+
+def test_an_observation_stands_in_the_log_where_it_says(first: Explanation, mapped: Mapped) -> None:
+    one = first.sightings[0]
+    logged = next(mapped.log.read(one.position.stream, first_number=one.position.number))
+    sweep = cast(LandmarksDetected, logged.envelope.event)
+    assert (logged.envelope.identity.sequence, logged.envelope.stamp_ns) == (one.sequence, one.stamp_ns)
+    assert (one.range_m, one.bearing_rad) in [(seen.range_m, seen.bearing_rad) for seen in sweep.detections]
+
+
+def test_of_a_sweep_the_detection_of_this_landmark_is_named(first: Explanation) -> None:
+    assert max(one.off_m for one in first.sightings if one.off_m is not None) < NEAR_M
+    assert all(one.off_m is not None for one in first.sightings)
+
+
+def test_a_tied_anchor_comes_with_its_residual_and_its_image_s_offset(first: Explanation, mapped: Mapped) -> None:
+    solved = logged_maps(mapped.log)[0]
+    (tied,) = first.anchors
+    associated = next(one for one in solved.anchors if one.landmark == mapped.landmark.landmark)
+    offset = next(one for one in solved.images if one.image == mapped.anchor.image)
+    assert (tied.anchor, tied.image, tied.reason) == (mapped.anchor.anchor, mapped.anchor.image, associated.reason)
+    assert (tied.residual_m, tied.offset_m) == (tuple(associated.residual_m), tuple(offset.offset_m))
+    logged = next(mapped.log.read(tied.position.stream, first_number=tied.position.number))
+    assert logged.envelope.event == replace(associated, residual_m=logged.envelope.event.residual_m)  # type: ignore[union-attr]
+
+
+def test_corrections_say_who_and_whether_the_version_heeded_them(first: Explanation, second: Explanation) -> None:
+    kinds = [type(one.event) for one in second.corrections]
+    assert kinds == [AnchorLabelled, DriveExcluded, AnchorRetracted]
+    assert [one.heeded for one in first.corrections] == [True, False, False]
+    assert [one.heeded for one in second.corrections] == [True, True, True]
+
+
+def test_after_the_corrections_neither_drive_nor_anchor_is_behind_it(second: Explanation) -> None:
+    assert {one.vehicle for one in second.sightings} == {"car"}
+    assert second.anchors == ()
+
+
+def test_each_version_in_which_it_moved_says_by_how_much(second: Explanation, mapped: Mapped) -> None:
+    new, moved = second.moves
+    assert (new.map_version, new.until, new.moved_m, new.anchors) == (1, 2, None, mapped.landmark.anchors)
+    assert (moved.map_version, moved.until, moved.anchors) == (2, None, ())
+    assert moved.moved_m is not None
+    assert 0.0 < moved.moved_m < 3.0 * (new.sigma_major_m + moved.sigma_major_m)
+
+
+def test_a_version_knows_nothing_of_later_ones(first: Explanation) -> None:
+    assert [one.map_version for one in first.moves] == [1]
+
+
+def test_an_unknown_landmark_is_refused_with_those_like_it(mapped: Mapped) -> None:
+    name = mapped.landmark.landmark
+    with pytest.raises(InputError, match=rf"'{name}x': the map never had one.* version 2 has '{name}'"):
+        explained(mapped.log, mapped.store, f"{name}x")
+
+
+def test_an_unknown_version_is_refused_with_those_there_are(mapped: Mapped) -> None:
+    with pytest.raises(InputError, match="map version 7 is unknown: 1 to 2 are there"):
+        explained(mapped.log, mapped.store, mapped.landmark.landmark, as_of=7)
+
+
+def test_a_landmark_of_another_version_is_told_where_it_is(mapped: Mapped) -> None:
+    before, after = ({row.landmark for row in solved.landmarks} for solved in logged_maps(mapped.log))
+    gone = sorted(before - after)[0]
+    with pytest.raises(InputError, match=rf"'{gone}' is not in map version 2, it is in versions 1 to 1"):
+        explained(mapped.log, mapped.store, gone)
+
+
+def test_only_the_time_it_was_seen_in_is_read(block: World, tmp_path: Path) -> None:
+    car = replace(block, drives=block.drives[:1])
+    log, store = McapLog(tmp_path / "log"), MemoryStore()
+    append_world(log, replace(car, drives=()))
+    _append_in_groups(log, car)
+    build(log, SETTINGS)
+    project(log, store)
+    seen_shortly = min(logged_maps(log)[0].landmarks, key=lambda one: one.last_seen_ns - one.first_seen_ns)
+    before = log.read_counts.chunks
+    found = explained(log, store, seen_shortly.landmark)
+    chunks = len(drive_rows(car.drives[0])) // GROUP
+    log.close()
+    assert len(found.sightings) == len(seen_shortly.observations)
+    assert log.read_counts.chunks - before < chunks / 2
+
+
+def _append_in_groups(log: EventLog, driven: World) -> None:
+    """The first drive's events, each group durable before the next: a chunk each."""
+    rows = drive_rows(driven.drives[0])
+    for start in range(0, len(rows), GROUP):
+        log.append(f"veh-{driven.drives[0].vehicle}", rows[start : start + GROUP])
