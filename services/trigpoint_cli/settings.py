@@ -27,6 +27,7 @@ from trigpoint.errors import InputError
 from trigpoint.observability.log_lines import Secrets
 from trigpoint_filtering.settings import FilterSettings
 from trigpoint_ingest.settings import IngestSettings
+from trigpoint_landmarks.settings import LandmarkSettings
 from trigpoint_optimisation.settings import SolveSettings
 from trigpoint_vehicle.settings import VehicleSettings
 
@@ -47,6 +48,7 @@ class Settings:
     ingest: Annotated[IngestSettings, NAMES_OF_FLEET] = field(default_factory=IngestSettings)
     filtering: FilterSettings = field(default_factory=FilterSettings)
     optimisation: SolveSettings = field(default_factory=SolveSettings)
+    landmarks: LandmarkSettings = field(default_factory=LandmarkSettings)
     vehicle: Annotated[VehicleSettings, ROOT_OF_FLEET] = field(default_factory=VehicleSettings)
     router: RouterSettings = field(default_factory=lambda: ROUTER)
     up: UpSettings = field(default_factory=UpSettings)
