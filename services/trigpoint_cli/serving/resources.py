@@ -3,8 +3,10 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 from trigpoint.bus.zenoh_bus import ZenohBus
+from trigpoint.landmarks.opening import geopackage_path, geopackage_url
 from trigpoint.logs.mcap_log import McapLog
 from trigpoint_cli.data_dir import DataDirectory
 from trigpoint_cli.settings import Settings
@@ -21,6 +23,12 @@ class Resources:
 def data_of(settings: Settings) -> DataDirectory:
     """The data directory of the fleet."""
     return DataDirectory(settings.fleet.data)
+
+
+def database_url(settings: Settings) -> str:
+    """The URL of the landmark database; one that names no file is that of the data directory."""
+    url = settings.database.url
+    return geopackage_url(data_of(settings).database) if geopackage_path(url) == Path() else url
 
 
 @contextmanager
