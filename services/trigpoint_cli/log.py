@@ -1,4 +1,4 @@
-"""`trigpoint log`: what log files hold, and whether they are whole."""
+"""`trigpoint log`: what log files hold, whether they are whole, and how they stay so."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -8,14 +8,19 @@ import click
 from trigpoint.logs.findings import FileSummary, Finding
 from trigpoint.logs.verification import Verification, verify
 from trigpoint_cli.data_dir import LOG_NAME
+from trigpoint_cli.log_keeping import recover_command, retain_command, seal_command
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering
 
 NS_PER_S = 1e9
 
 
-@click.group("log", help="What log files hold, and whether they are whole.")
+@click.group("log", help="What log files hold, whether they are whole, and how they stay so.")
 def command() -> None:
     """Group of what can be asked of log files."""
+
+
+for keeping in (seal_command, retain_command, recover_command):
+    command.add_command(keeping)
 
 
 def _verified(path: Path) -> Verification:
@@ -91,6 +96,20 @@ def verify_command(path: Path, *, screen: Screen) -> Answer:
         "count": count,
         "files": len(found.files),
         "findings": [_finding_values(finding) for finding in found.findings],
+        "absences": [
+            {
+                "stream": stream,
+                "numbers": [absence.first_number, absence.stop_number],
+                "reason": absence.reason.value,
+            }
+            for stream, absence in found.absences
+        ],
     }
-    lines = (f"{count} events in {len(found.files)} files, {len(found.findings)} findings",)
+    lines = (
+        f"{count} events in {len(found.files)} files, {len(found.findings)} findings",
+        *(
+            f"{stream}: numbers {absence.first_number} to {absence.stop_number - 1}: {absence.reason.value}"
+            for stream, absence in found.absences
+        ),
+    )
     return Answer(values, lines, tuple(map(_line, found.findings)))

@@ -22,7 +22,7 @@ from trigpoint.logs.catalog import NAME, Catalog, CatalogChunk, CatalogFile, Fil
 from trigpoint.logs.channels import ChannelKey, PackedRows, packed_rows
 from trigpoint.logs.chunks import FRAME, messages, parsed, unpacked
 from trigpoint.logs.headers import chunk_headers, index_bytes
-from trigpoint.logs.log_files import bring_up_to_date, file_path, valid_stream
+from trigpoint.logs.log_files import bring_up_to_date, file_path, has_writer, valid_stream
 from trigpoint.logs.ports import LoggedBoot, LoggedEvent
 from trigpoint.logs.stream_writer import Rotation, StreamWriter
 
@@ -232,6 +232,22 @@ class McapLog:
                 if stream in self._writers and self._end_aged(stream, now_ns):
                     ended.append(stream)
         return tuple(ended)
+
+    def end_abandoned(self) -> tuple[str, ...]:
+        """Every file ended that no writer has open, all streams then let go; the streams that are being written.
+
+        Raises LogDamaged, AppendFailed as appending does.
+        """
+        written = []
+        for stream in self.streams():
+            if has_writer(self.directory / stream):
+                written.append(stream)
+            elif not all(contents.file.finished for contents in self.contents(stream)):
+                self.append(stream, ())
+        with self._lock:
+            for stream in [stream for stream in self._writers if stream not in written]:
+                self._writers.pop(stream).close()
+        return tuple(written)
 
     def _end_aged(self, stream: str, now_ns: int) -> bool:
         try:

@@ -1,6 +1,7 @@
 """Finished log files sealed: a SHA-256 beside each, as `sha256sum --check` reads it."""
 
 import hashlib
+from dataclasses import dataclass
 from pathlib import Path
 
 from trigpoint.errors import LogDamaged
@@ -39,10 +40,24 @@ def seal(path: Path) -> bool:
     return True
 
 
-def seal_finished(folder: Path) -> tuple[Path, ...]:
-    """The files of a stream that were sealed now: every finished one that was not. Raises LogDamaged, OSError."""
-    paths = [file_path(folder, number) for number in file_numbers(folder)]
-    return tuple(path for path in paths if not is_sealed(path) and seal(path))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sealing:
+    """What came of sealing: files sealed now, and what is wrong with finished files that could not be."""
+
+    sealed: tuple[Path, ...]
+    faults: tuple[str, ...]
+
+
+def seal_finished(folder: Path) -> Sealing:
+    """Every finished file of a stream sealed that was not and is whole. Raises OSError."""
+    sealed, faults = [], []
+    for path in (file_path(folder, number) for number in file_numbers(folder)):
+        try:
+            if not is_sealed(path) and seal(path):
+                sealed.append(path)
+        except LogDamaged as error:
+            faults.append(str(error))
+    return Sealing(sealed=tuple(sealed), faults=tuple(faults))
 
 
 def seal_fault(path: Path) -> str:
