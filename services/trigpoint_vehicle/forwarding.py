@@ -105,7 +105,7 @@ class Forwarder:
         self._acknowledgements = self._bus = None
 
     def step(self, wait_s: float) -> bool:
-        """Whether there is more to be sent at once; waits up to `wait_s` for an acknowledgement first.
+        """Whether something was sent, and so more may follow; waits up to `wait_s` for an acknowledgement first.
 
         Raises ServiceError if the bus is closed or the source cannot be read.
         """
@@ -117,10 +117,8 @@ class Forwarder:
         self._look(self._bus, now_s)
         if self._patience.is_over(now_s):
             self._send_again(now_s)
-            self._send(self._bus)
-        elif self._may_send(now_s):
-            self._send(self._bus)
-        return bool(self._under_way.unsent) and self._may_send(now_s)
+            return self._send(self._bus)
+        return self._may_send(now_s) and self._send(self._bus)
 
     def _hear(self, wait_s: float) -> None:
         if self._acknowledgements is None:
@@ -138,12 +136,11 @@ class Forwarder:
             self._patience = after_progress(self._patience, now_s=self._now_s(), more=self._under_way.awaiting > 0)
 
     def _fill(self) -> None:
-        while (room := self._under_way.room) and (room_bytes := self._under_way.room_bytes):
-            messages = self._source.read(count=min(room, self._settings.together_count), size_bytes=room_bytes)
-            for message in messages:
-                self._under_way.add(message)
-            if not messages:
-                return
+        under_way = self._under_way
+        count = min(under_way.room, self._settings.together_count)
+        if count and not under_way.unsent:
+            for message in self._source.read(count=count, size_bytes=under_way.room_bytes):
+                under_way.add(message)
 
     def _look(self, bus: Bus, now_s: float) -> None:
         """Whether anybody listens; where somebody does again, what was sent meanwhile is sent again."""
@@ -163,7 +160,7 @@ class Forwarder:
         count = self._under_way.send_again()
         logger.info("%s: %d messages are sent again from %s", self._vehicle, count, self.oldest)
 
-    def _send(self, bus: Bus) -> None:
+    def _send(self, bus: Bus) -> bool:
         settings = self._settings
         messages = self._under_way.to_send(count=settings.together_count, size_bytes=settings.together_bytes)
         groups: dict[SendChannel, list[Outgoing]] = {}
@@ -174,6 +171,7 @@ class Forwarder:
         if messages:
             self.sent += len(messages)
             self._patience = after_sending(self._patience, now_s=self._now_s())
+        return bool(messages)
 
 
 def _run(channel: SendChannel, messages: Sequence[Outgoing]) -> BusRun:
