@@ -1,6 +1,6 @@
 """Projects solved map versions into the landmark database, and answers questions about the map.
 
-Reads: AnchorAssociated, AnchorLabelled, AnchorRetracted, DriveExcluded, DriveIncluded, ImageOffsetSolved,
-LandmarkSolved, LandmarksDetected, MapFramePinned, MapSolved, TrajectorySolved, VehicleDescribed
+Reads: AnchorAssociated, AnchorLabelled, AnchorRetracted, ImageOffsetSolved, LandmarkSolved, MapFramePinned, MapSolved,
+TrajectorySolved
 Writes: (nothing)
 """

@@ -33,24 +33,22 @@ def project(log: EventLog, store: LandmarkStore, *, progress: Progress = in_sile
     settings = LandmarkSettings()
     applied: list[int] = []
     refused: list[tuple[int, str]] = []
-    projector = Projector(log, store, refused=lambda map_version, reason: refused.append((map_version, reason)))
-    total, done = projector.lag_events, 0
-    if total > settings.bulk_events:
-        store.defer_indexes()
-    while True:
+    with closing(Projector(log, store, refused=lambda version, reason: refused.append((version, reason)))) as projector:
+        total = projector.lag_events
+        if total > settings.bulk_events:
+            store.defer_indexes()
         taken, versions = projector.take(settings.batch_events)
-        applied += versions
-        done += taken
-        if not taken:
-            break
-        progress(done, max(done, total))
-    store.restore_indexes()
-    return ProjectionReport(
-        applied=tuple(applied),
-        refused=tuple(refused),
-        map_version=projector.map_version or None,
-        landmark_count=projector.landmark_count,
-    )
+        while taken:
+            applied += versions
+            progress(total - projector.lag_events, total)
+            taken, versions = projector.take(settings.batch_events)
+        store.restore_indexes()
+        return ProjectionReport(
+            applied=tuple(applied),
+            refused=tuple(refused),
+            map_version=projector.map_version or None,
+            landmark_count=projector.landmark_count,
+        )
 
 
 def replay_difference(

@@ -1,8 +1,10 @@
 """Map versions taken from the log into one store, many in one transaction."""
 
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import cast
 
+from trigpoint.errors import FrameRefused
 from trigpoint.events.corrected import AnchorLabelled, Corrected
 from trigpoint.events.envelope import Envelope, LogPosition
 from trigpoint.events.keys import STREAM_PATTERNS
@@ -19,7 +21,7 @@ from trigpoint.landmarks.model import Landmark, MapChange
 from trigpoint.landmarks.ports import LandmarkStore
 from trigpoint.landmarks.queries import LandmarkQuery
 from trigpoint.logs.following import StreamFollower
-from trigpoint.logs.ports import EventLog
+from trigpoint.logs.ports import EventLog, LoggedEvent
 from trigpoint.logs.readings import logged_frame
 from trigpoint_landmarks.core.rows import labels_within, make_valid, map_change
 from trigpoint_landmarks.core.versions import OpenVersion, SolvedVersion, refusal_of
@@ -36,7 +38,7 @@ Refused = Callable[[int, str], None]
 class Projector:
     """Follows the optimiser's stream from the store's checkpoint on; what it knows of the store is read once.
 
-    A version whose events are not whole is refused, with the reason; the next one goes on.
+    A version whose events are not whole is refused, with the reason; the next one goes on. Close it.
     """
 
     def __init__(self, log: EventLog, store: LandmarkStore, *, refused: Refused) -> None:
@@ -44,8 +46,10 @@ class Projector:
         self._checkpoint = store.checkpoint()
         self._valid: dict[str, Landmark] = {row.landmark: row for row in store.landmarks(LandmarkQuery())}
         self._newest = max((version.map_version for version in store.map_versions()), default=0)
-        held = {MAP_STREAM: self._checkpoint.next_number(MAP_STREAM)}
-        self._follower = StreamFollower(log, (MAP_STREAM,), checkpoint=held, kinds=KINDS)
+        self.next_number = self._checkpoint.next_number(MAP_STREAM)  # of the first event not taken
+        self._follower = StreamFollower(log, (MAP_STREAM,), checkpoint={MAP_STREAM: self.next_number}, kinds=KINDS)
+        self._reader = ThreadPoolExecutor(max_workers=1, thread_name_prefix="reading-ahead")
+        self._ahead: Future[list[LoggedEvent]] | None = None
         self._open = OpenVersion()
         self._frame: MapFrame | None = None
         self._labels: tuple[Inputs, Labels] = ((), {})
@@ -63,7 +67,7 @@ class Projector:
     @property
     def lag_events(self) -> int:
         """How many events stand in the log that were not taken."""
-        return self._follower.lag
+        return self._log.next_number(MAP_STREAM) - self.next_number
 
     def take(self, limit: int) -> tuple[int, tuple[int, ...]]:
         """How many of the next events were taken, at most `limit`, and the versions that are in the store by them.
@@ -71,29 +75,45 @@ class Projector:
         Raises InputError if versions are there and no frame is pinned, LogDamaged, and ServiceError from the store;
         after any of these the store is as it was, and this projector of no more use.
         """
-        rows = self._follower.take(limit)
+        rows = self._rows(limit)
         changes: list[MapChange] = []
         checkpoint = self._checkpoint
         for row in rows:
             version = self._open.after(row.position, cast(Envelope[Mapped], row.envelope))
-            if version is not None and self._is_taken(version):
-                changes.append(self._change_of(version))
+            change = None if version is None else self._change_of(version)
+            if version is not None and change is not None:
+                changes.append(change)
                 checkpoint = checkpoint.after(version.position)
         if changes:
             self._store.apply_all(changes, checkpoint)
             self._checkpoint = checkpoint
+        if rows:
+            self.next_number = rows[-1].position.number + 1
         return len(rows), tuple(change.version.map_version for change in changes)
 
-    def _is_taken(self, version: SolvedVersion) -> bool:
+    def close(self) -> None:
+        """Nothing is read any more."""
+        self._reader.shutdown(cancel_futures=True)
+
+    def _rows(self, limit: int) -> list[LoggedEvent]:
+        """The next events; while the database takes them in, those after them are read."""
+        rows = self._follower.take(limit) if self._ahead is None else self._ahead.result()
+        self._ahead = self._reader.submit(self._follower.take, limit) if len(rows) == limit else None
+        return rows
+
+    def _change_of(self, version: SolvedVersion) -> MapChange | None:
+        """What the version changes, which is known from now on; None for one that is refused."""
         reason = refusal_of(version, newest=self._newest, valid=self._valid)
         if reason:
             self._refused(version.solved.map_version, reason)
-        return not reason
-
-    def _change_of(self, version: SolvedVersion) -> MapChange:
-        self._frame = self._frame or logged_frame(self._log)
+            return None
+        frame = self._frame = self._frame or logged_frame(self._log)
         labels = self._labels_of(version.solved.inputs) if version.anchors else {}
-        change = map_change(version, frame=self._frame, labels=labels, valid=self._valid)
+        try:
+            change = map_change(version, frame=frame, labels=labels, valid=self._valid)
+        except FrameRefused as error:
+            self._refused(version.solved.map_version, str(error))
+            return None
         make_valid(self._valid, change)
         self._newest = version.solved.map_version
         return change

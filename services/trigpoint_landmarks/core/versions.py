@@ -74,7 +74,21 @@ def refusal_of(version: SolvedVersion, *, newest: int, valid: Collection[str]) -
     count = landmark_count(version, valid)
     if solved.landmark_count != count:
         return f"MapSolved counts {solved.landmark_count} landmarks: {count} are in the log"
+    if any("\0" in text for text in _texts(version)):
+        return "a name or text has the character U+0000, which no database keeps"
     return _infinity_of(version.landmarks)
+
+
+def _texts(version: SolvedVersion) -> Iterator[str]:
+    """Everything of a version that a database keeps as text just as it is."""
+    for landmark in version.landmarks:
+        yield from (landmark.landmark, landmark.kind, landmark.signature)
+    for path in version.trajectories:
+        yield from (path.vehicle, path.boot_id)
+    for anchor in version.anchors:
+        yield from (anchor.anchor, anchor.image, anchor.landmark, anchor.reason)
+    yield from (offset.image for offset in version.image_offsets)
+    yield from (version.solved.method, version.solved.settings_json)
 
 
 def landmark_count(version: SolvedVersion, valid: Collection[str]) -> int:

@@ -10,7 +10,7 @@ from sqlalchemy import Connection, create_engine, text
 from sqlalchemy.exc import DatabaseError
 from sqlalchemy.pool import StaticPool
 
-from trigpoint.errors import InputError, ServiceError
+from trigpoint.errors import DatabaseUnavailable, InputError, ServiceError
 from trigpoint.landmarks import geopackage_geometry as geometry
 from trigpoint.landmarks import geopackage_schema as schema
 from trigpoint.landmarks import tables
@@ -18,6 +18,7 @@ from trigpoint.landmarks import tables
 CACHE_KIB = 65_536  # holds a map of 200 000 landmarks; SQLite's own 2 MB make every query read the file
 BUSY_TIMEOUT_S = 30.0  # how long a GIS program that is reading may keep a map version waiting
 DAMAGE_CODES = frozenset({sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_CORRUPT_VTAB})
+PASSING_CODES = frozenset({sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED, sqlite3.SQLITE_FULL})
 UNDATED = "1970-01-01T00:00:00.000Z"  # of layers still empty: a file's content never depends on the clock
 SQL_FUNCTIONS = {
     "ST_MinX": geometry.min_x,
@@ -30,7 +31,8 @@ SQL_FUNCTIONS = {
 
 @contextmanager
 def database_errors(path: Path) -> Iterator[None]:
-    """SQLite's errors inside, with the file's name: InputError if the file is damaged or none, else ServiceError."""
+    """SQLite's errors inside, with the file's name: InputError if the file is damaged or none, DatabaseUnavailable if
+    it is locked or the disk full, else ServiceError."""
     try:
         yield
     except (UnicodeDecodeError, JSONDecodeError) as error:
@@ -39,7 +41,13 @@ def database_errors(path: Path) -> Iterator[None]:
         cause = error.orig if isinstance(error, DatabaseError) else error
         if _is_damage(cause):
             raise InputError(f"{path} is not a sound database: {cause}; delete it and replay the log") from error
-        raise ServiceError(f"landmark database {path}: {cause}") from error
+        kind = DatabaseUnavailable if _primary_code(cause) in PASSING_CODES else ServiceError
+        raise kind(f"landmark database {path}: {cause}") from error
+
+
+def _primary_code(cause: BaseException | None) -> int:
+    """SQLite's error code without its details."""
+    return getattr(cause, "sqlite_errorcode", 0) & 0xFF
 
 
 def _is_damage(cause: BaseException | None) -> bool:
