@@ -6,8 +6,8 @@ import click
 
 from trigpoint_cli.data_dir import DataDirectory, as_of_option, data_option
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering, metres, utc
-from trigpoint_landmarks.core.explanation import Explanation, LoggedCorrection, Move, Sighting, TiedAnchor
-from trigpoint_landmarks.explaining import explained
+from trigpoint_evaluation.core.explanation import Explanation, LoggedCorrection, Move, Sighting, TiedAnchor
+from trigpoint_evaluation.explaining import explained
 
 LISTED = 20  # lines of one kind on a screen; --json has all
 

@@ -17,10 +17,10 @@ from trigpoint.logs.mcap_log import McapLog
 from trigpoint.logs.memory_log import MemoryLog
 from trigpoint.logs.ports import EventLog
 from trigpoint.logs.readings import logged_maps
+from trigpoint_evaluation.core.explanation import Explanation
+from trigpoint_evaluation.explaining import explained
 from trigpoint_ingest.corrections import Attribution, exclude_drives, retract_anchor
 from trigpoint_landmarks.app import project
-from trigpoint_landmarks.core.explanation import Explanation
-from trigpoint_landmarks.explaining import explained
 from trigpoint_optimisation.app import build
 from trigpoint_optimisation.settings import OdometrySettings, SolveSettings
 

@@ -1,0 +1,217 @@
+"""Gathers what stands behind a landmark, from the database and the log; of the log only where it can be."""
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from itertools import takewhile
+from typing import cast
+
+from trigpoint.errors import InputError
+from trigpoint.events.corrected import AnchorLabelled, Corrected
+from trigpoint.events.envelope import LogPosition
+from trigpoint.events.keys import STREAM_PATTERNS
+from trigpoint.events.mapped import AnchorAssociated, ImageOffsetSolved, MapSolved, TrajectorySolved
+from trigpoint.events.names import nearest_names
+from trigpoint.events.observed import LandmarksDetected, VehicleDescribed
+from trigpoint.landmarks.model import Landmark, MapVersion, valid_at
+from trigpoint.landmarks.ports import LandmarkStore
+from trigpoint.landmarks.queries import Disc, LandmarkQuery, require_known_version
+from trigpoint.logs.ports import EventLog, LoggedBoot, LoggedEvent
+from trigpoint_evaluation.core.explanation import (
+    AnchorName,
+    DriveName,
+    Explanation,
+    Sighting,
+    TiedAnchor,
+    corrections_behind,
+    detection_of,
+    moves_of,
+    sensor_pose,
+    sweeps_of,
+)
+
+MAP_STREAM = STREAM_PATTERNS[MapSolved]
+LABEL_STREAM = STREAM_PATTERNS[AnchorLabelled]
+PARTS = (AnchorAssociated, ImageOffsetSolved, MapSolved, TrajectorySolved)
+NEARBY_M = 2.0  # where a landmark of another name may be the same pole: seen first by another drive
+
+
+@dataclass(slots=True)
+class _Parts:
+    """What a version and those it is based on say of a landmark, the newest of each."""
+
+    paths: dict[DriveName, TrajectorySolved] = field(default_factory=dict)
+    tied: dict[AnchorName, tuple[AnchorAssociated, LogPosition]] = field(default_factory=dict)
+    offsets: dict[str, ImageOffsetSolved] = field(default_factory=dict)
+
+
+def explained(log: EventLog, store: LandmarkStore, landmark: str, *, as_of: int | None = None) -> Explanation:
+    """Everything behind a landmark of a map version (None: the newest).
+
+    Raises InputError for an unknown version, and for a landmark that is not in it, naming those most like it or the
+    versions it is in; LogDamaged where the log cannot be read.
+    """
+    versions, history = store.map_versions(), store.history(landmark)
+    known = [version.map_version for version in versions]
+    map_version = (known or [0])[-1] if as_of is None else as_of
+    require_known_version(map_version, known)
+    row = next((row for row in history if valid_at(row, map_version)), None)
+    if row is None:
+        raise InputError(_absence(store, landmark, history, map_version))
+    before = tuple(one for one in history if one.valid_from_version <= map_version)
+    parts = _parts_of(log, versions, row, map_version)
+    sightings = tuple(
+        sighting for drive, sweeps in sweeps_of(row).items() for sighting in _seen(log, row, drive, sweeps, parts)
+    )
+    return Explanation(
+        landmark=row,
+        map_version=map_version,
+        sightings=tuple(sorted(sightings, key=lambda one: (one.stamp_ns, one.vehicle))),
+        missing=sum(map(len, sweeps_of(row).values())) - len(sightings),
+        anchors=tuple(_tied_anchor(event, position, parts) for event, position in parts.tied.values()),
+        corrections=corrections_behind(
+            _corrections(log),
+            anchors=_anchors_ever(log, versions, before, parts),
+            drives={drive for one in before for drive in sweeps_of(one)},
+            read=_read_corrections(versions, map_version),
+        ),
+        moves=moves_of(before),
+    )
+
+
+def _absence(store: LandmarkStore, landmark: str, history: Sequence[Landmark], map_version: int) -> str:
+    """Why a landmark is not in a version."""
+    if not history:
+        there = nearest_names(landmark, (row.landmark for row in store.landmarks(LandmarkQuery(as_of=map_version))))
+        return f"landmark {landmark!r}: the map never had one of that name; version {map_version} has {there}"
+    spans = ", ".join(
+        f"{row.valid_from_version} to {'today' if row.valid_to_version is None else row.valid_to_version - 1}"
+        for row in history
+    )
+    last = history[-1]
+    place = Disc(lat_deg=last.lat_deg, lon_deg=last.lon_deg, radius_m=NEARBY_M)
+    near = store.landmarks(LandmarkQuery(near=place, as_of=map_version, limit=1))
+    instead = f"; within {NEARBY_M:g} m of it there stands {near[0].landmark!r}" if near else ""
+    return f"landmark {landmark!r} is not in map version {map_version}, it is in versions {spans}{instead}"
+
+
+def _parts_of(log: EventLog, versions: Sequence[MapVersion], row: Landmark, map_version: int) -> _Parts:
+    """The paths and associations behind a row, from the version back over those it is based on until all are found."""
+    parts, drives = _Parts(), set(sweeps_of(row))
+    by_number = {version.map_version: version for version in versions}
+    at = by_number.get(map_version)
+    while at is not None:
+        _take(parts, _rows_of(log, versions, at), row, drives)
+        tied = {anchor for anchor, _ in parts.tied}
+        found_all = drives <= parts.paths.keys() and tied >= set(row.anchors)
+        at = None if found_all else by_number.get(at.base_version)
+    return parts
+
+
+def _rows_of(log: EventLog, versions: Sequence[MapVersion], version: MapVersion) -> list[LoggedEvent]:
+    """A version's events, but for its landmarks: those before its MapSolved that its writer wrote for it."""
+    first = max((one.log_number + 1 for one in versions if one.log_number < version.log_number), default=0)
+    read = log.read(version.log_stream, first_number=first, kinds=PARTS)
+    rows = list(takewhile(lambda row: row.position.number <= version.log_number, read))
+    if not rows:
+        return []
+    writer = rows[-1].envelope.identity
+    return [
+        row
+        for row in rows
+        if (row.envelope.identity.source, row.envelope.identity.boot_id) == (writer.source, writer.boot_id)
+    ]
+
+
+def _take(parts: _Parts, rows: Iterable[LoggedEvent], landmark: Landmark, drives: set[DriveName]) -> None:
+    """What the rows of one version say that no newer one has said."""
+    paths, tied, offsets = dict(parts.paths), dict(parts.tied), dict(parts.offsets)
+    for row in rows:
+        event = row.envelope.event
+        if isinstance(event, TrajectorySolved) and (event.vehicle, event.boot_id) in drives:
+            paths[event.vehicle, event.boot_id] = event
+        elif isinstance(event, AnchorAssociated) and event.landmark == landmark.landmark:
+            tied[event.anchor, event.image] = event, row.position
+        elif isinstance(event, ImageOffsetSolved):
+            offsets[event.image] = event
+    parts.paths, parts.tied, parts.offsets = paths | parts.paths, tied | parts.tied, offsets | parts.offsets
+
+
+def _seen(log: EventLog, row: Landmark, drive: DriveName, sweeps: Sequence[int], parts: _Parts) -> list[Sighting]:
+    """The sweeps of one drive that saw the landmark: read only from the time it was seen in."""
+    vehicle, boot_id = drive
+    stream = STREAM_PATTERNS[LandmarksDetected].format(vehicle=vehicle)
+    boot = next((one for one in log.boots(stream) if (one.source, one.boot_id) == drive), None)
+    if boot is None:
+        return []
+    described = _described(log, stream, boot)
+    from_ns, until_ns = max(row.first_seen_ns, boot.start_ns), min(row.last_seen_ns, boot.end_ns) + 1
+    wanted = set(sweeps)
+    return [
+        _sighting(logged, row, parts.paths.get(drive), described)
+        for logged in log.read(stream, from_ns=from_ns, until_ns=until_ns, kinds=(LandmarksDetected,))
+        if logged.envelope.identity.boot_id == boot_id and logged.envelope.identity.sequence in wanted
+    ]
+
+
+def _described(log: EventLog, stream: str, boot: LoggedBoot) -> VehicleDescribed:
+    """What the vehicle said of itself in this boot last."""
+    said = VehicleDescribed(vehicle=boot.source)
+    for logged in log.read(stream, from_ns=boot.start_ns, until_ns=boot.end_ns + 1, kinds=(VehicleDescribed,)):
+        if logged.envelope.identity.boot_id == boot.boot_id:
+            said = cast(VehicleDescribed, logged.envelope.event)
+    return said
+
+
+def _sighting(
+    logged: LoggedEvent, row: Landmark, path: TrajectorySolved | None, described: VehicleDescribed
+) -> Sighting:
+    identity, stamp_ns = logged.envelope.identity, logged.envelope.stamp_ns
+    sweep = cast(LandmarksDetected, logged.envelope.event)
+    seen, off_m = detection_of(row, sweep.detections, sensor_pose(path, described, stamp_ns))
+    return Sighting(
+        vehicle=identity.source,
+        boot_id=identity.boot_id,
+        sequence=identity.sequence,
+        stamp_ns=stamp_ns,
+        position=logged.position,
+        range_m=None if seen is None else seen.range_m,
+        bearing_rad=None if seen is None else seen.bearing_rad,
+        off_m=off_m,
+    )
+
+
+def _tied_anchor(event: AnchorAssociated, position: LogPosition, parts: _Parts) -> TiedAnchor:
+    offset = parts.offsets.get(event.image)
+    return TiedAnchor(
+        anchor=event.anchor,
+        image=event.image,
+        reason=event.reason,
+        residual_m=(float(event.residual_m[0]), float(event.residual_m[1])),
+        offset_m=None if offset is None else (float(offset.offset_m[0]), float(offset.offset_m[1])),
+        map_version=event.map_version,
+        position=position,
+    )
+
+
+def _anchors_ever(
+    log: EventLog, versions: Sequence[MapVersion], history: Sequence[Landmark], parts: _Parts
+) -> set[AnchorName]:
+    """The anchors tied to the landmark in any of these rows: as associated then."""
+    tied, looked_for = set(parts.tied), {anchor for anchor, _ in parts.tied}
+    for row in history:
+        if not looked_for >= set(row.anchors):
+            tied |= set(_parts_of(log, versions, row, row.valid_from_version).tied)
+            looked_for |= set(row.anchors)
+    return tied
+
+
+def _corrections(log: EventLog) -> Iterable[tuple[LogPosition, int, Corrected]]:
+    for row in log.read(LABEL_STREAM):
+        yield row.position, row.envelope.stamp_ns, cast(Corrected, row.envelope.event)
+
+
+def _read_corrections(versions: Sequence[MapVersion], map_version: int) -> int:
+    """How many corrections a version was solved from."""
+    inputs = next(version.inputs_json for version in versions if version.map_version == map_version)
+    return dict(cast(list[tuple[str, int]], json.loads(inputs))).get(LABEL_STREAM, 0)
