@@ -62,7 +62,7 @@ INGEST = Grant(
         "map/*/drive-inclusion",
     ),
     listen=("veh/*/up/**",),
-    claim=("live/ingest/**",),
+    claim=("live/ingest/**", "live/ingest-of-all/**"),
     watch=("live/**",),
     hear_of=("**",),
 )

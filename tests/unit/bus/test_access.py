@@ -8,7 +8,7 @@ from trigpoint.bus.access import GRANTS, Grant, access_control
 from trigpoint.bus.key_expressions import key_matches
 from trigpoint.bus.register import Register, Registration, Role
 from trigpoint.dataflow import FLOWS, Flow
-from trigpoint.events.uplink import acknowledgement_key, uplink_key
+from trigpoint.events.uplink import acknowledgement_key, claim_expressions, claim_key, uplink_key
 
 ROOT = "fleet"
 ON_THE_BUS = {
@@ -55,6 +55,16 @@ def test_a_vehicle_sends_and_is_acknowledged_under_its_own_name_only() -> None:
     heard = [acknowledgement_key(name, root=ROOT).removeprefix(f"{ROOT}/v1/") for name in ("veh-a", "veh-b")]
     assert [allowed(Role.VEHICLE, "publish", key) for key in (own, other)] == [True, False]
     assert [allowed(Role.VEHICLE, "listen", key) for key in heard] == [True, False]
+
+
+@pytest.mark.parametrize("vehicle", ["veh-a", None])
+def test_ingest_may_claim_its_vehicles_and_see_who_else_does(vehicle: str | None) -> None:
+    claim = claim_key(vehicle, "1", root=ROOT).removeprefix(f"{ROOT}/v1/")
+    looks = [one.removeprefix(f"{ROOT}/v1/") for one in claim_expressions(vehicle, root=ROOT)]
+    assert allowed(Role.INGEST, "claim", claim)
+    assert all(look.startswith("live/") for look in looks)
+    assert GRANTS[Role.INGEST].watch == ("live/**",)
+    assert not allowed(Role.VEHICLE, "claim", claim)
 
 
 def test_what_a_vehicle_reads_beside_its_own_is_what_a_client_reads() -> None:
