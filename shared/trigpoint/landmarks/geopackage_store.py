@@ -47,6 +47,7 @@ from trigpoint.landmarks.queries import (
 INSERT_SQL = f"INSERT INTO landmarks ({', '.join(COLUMNS)}) VALUES ({', '.join('?' * len(COLUMNS))})"
 HISTORY_SQL = tuple(f"SELECT {', '.join(COLUMNS)} FROM {one.name} WHERE landmark = ?" for one in LANDMARK_TABLES)
 HISTORY_SQL = tuple(f"SELECT {', '.join(COLUMNS)} FROM {one.name} WHERE landmark = ?" for one in LANDMARK_TABLES)
+HISTORY_SQL = tuple(f"SELECT {', '.join(COLUMNS)} FROM {one.name} WHERE landmark = ?" for one in LANDMARK_TABLES)
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
@@ -90,6 +91,12 @@ class GeoPackageStore:
             sources = LANDMARK_TABLES if older else LANDMARK_TABLES[:1]
             found = [landmark for source in sources for landmark in self._found(source, query, older=older)]
         return answered(found, query)
+
+    def history(self, landmark: str) -> tuple[Landmark, ...]:
+        """Every row a landmark has had, in order of version."""
+        with database_errors(self._path):
+            found = [row for statement in HISTORY_SQL for row in self._driver.execute(statement, (landmark,))]
+        return tuple(sorted(map(_landmark, found), key=lambda row: row.valid_from_version))
 
     def history(self, landmark: str) -> tuple[Landmark, ...]:
         """Every row a landmark has had, in order of version."""

@@ -100,6 +100,17 @@ class PostgisStore:
                 found += [found_landmark(row) for row in own]
         return tuple(sorted(found, key=lambda row: row.valid_from_version))
 
+    def history(self, landmark: str) -> tuple[Landmark, ...]:
+        """Every row a landmark has had, in order of version."""
+        with self._session.transaction() as connection:
+            versions = _versions(connection)
+            found = []
+            for source in LANDMARK_TABLES if versions else ():
+                everything = landmark_statement(source, LandmarkQuery(), version=versions[0], older=False)
+                own = connection.execute(everything.where(source.c.landmark == landmark))
+                found += [found_landmark(row) for row in own]
+        return tuple(sorted(found, key=lambda row: row.valid_from_version))
+
     def changes(self, query: LandmarkQuery, *, since: int) -> LandmarkChanges:
         """What changed since a version among the landmarks that meet a query."""
         with self._session.transaction() as connection:
