@@ -1,5 +1,7 @@
 """Services killed by signal 9 at random moments, and started again by whoever supervises them."""
 
+import http.client
+import json
 import os
 import signal
 import threading
@@ -8,6 +10,7 @@ from dataclasses import dataclass
 from random import Random
 
 from command_runs.processes import Fleet, wait_until
+from fleet_runs.running import alone
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,3 +55,21 @@ def kill_all(fleet: Fleet, killing: Killing) -> Sequence[str]:
         kill(fleet, name)
         killed.append(name)
     return killed
+
+
+def kill_while_catching_up(fleet: Fleet, name: str, *, times: int, seed: int = 1, wait_max_s: float = 0.5) -> None:
+    """One service started and killed so many times, each at a random moment of its work on what the log holds."""
+    die, pause = Random(seed), threading.Event()
+    for _ in range(times):
+        with alone(fleet, name) as process:
+            wait_until(lambda: is_at_work(fleet, name) or process.popen.poll() is not None, f"{name} at work")
+            assert process.popen.poll() is None, process.err
+            pause.wait(die.uniform(0.0, wait_max_s))
+            process.send(signal.SIGKILL)
+            process.ended()
+
+
+def is_at_work(fleet: Fleet, name: str) -> bool:
+    """Whether a service runs, ready or not."""
+    status, page = fleet.page(name, "/healthz")
+    return status == http.client.OK and json.loads(page)["stage"] == "running"

@@ -8,7 +8,7 @@ from pathlib import Path
 from command_runs.processes import Fleet
 from trigpoint.events.codec import encode
 from trigpoint.landmarks.model import MapRow
-from trigpoint.landmarks.opening import opened_store
+from trigpoint.landmarks.opening import geopackage_path, geopackage_url, opened_store
 from trigpoint.logs.mcap_log import McapLog
 from trigpoint_landmarks.core.comparison import differences
 
@@ -29,7 +29,7 @@ class Outcome:
 
 
 def outcome_of(fleet: Fleet, *, url: str | None = None, password_file: Path | None = None) -> Outcome:
-    """What a run left, after its processes ended."""
+    """What a run left, after its processes ended; no rows where there is no database."""
     with closing(McapLog(fleet.data / "log")) as log:
         boots: dict[tuple[str, str, str], list[Row]] = {}
         for stream in log.streams():
@@ -37,12 +37,16 @@ def outcome_of(fleet: Fleet, *, url: str | None = None, password_file: Path | No
                 identity, event = logged.envelope.identity, logged.envelope.event
                 row = (identity.sequence, logged.envelope.stamp_ns, *encode(event))
                 boots.setdefault((stream, identity.source, identity.boot_id), []).append(row)
-    store = opened_store(
-        url or f"geopackage:{fleet.data / 'landmarks.gpkg'}", password_file=password_file, read_only=True
-    )
-    with closing(store):
-        rows = tuple(store.rows())
-    return Outcome(boots={key: tuple(rows) for key, rows in boots.items()}, rows=rows)
+    rows = _rows(url or geopackage_url(fleet.data / "landmarks.gpkg"), password_file)
+    return Outcome(boots={key: tuple(found) for key, found in boots.items()}, rows=rows)
+
+
+def _rows(url: str, password_file: Path | None) -> tuple[MapRow, ...]:
+    path = geopackage_path(url)
+    if path is not None and not path.is_file():
+        return ()
+    with closing(opened_store(url, password_file=password_file, read_only=True)) as store:
+        return tuple(store.rows())
 
 
 def stream_differences(ours: Outcome, theirs: Outcome, *, streams: tuple[str, ...] | None = None) -> list[str]:

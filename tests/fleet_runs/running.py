@@ -1,12 +1,10 @@
-"""A fleet's run from the first message to the last row: driven, killed on the way or not, and settled."""
+"""A fleet's services run on what its log holds, until they have taken in all of it."""
 
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 
-from command_runs.processes import Fleet, fleet_in, trigpoint_process, wait_until
-from fleet_runs.driving import Rows, vehicles_on_the_road
-from fleet_runs.killing import Killing, kill_all
+from command_runs.processes import Fleet, Process, fleet_in, trigpoint_process, wait_until
 
 FOLLOWERS = ("filtering", "optimisation", "landmarks")  # in the order events go through them
 QUICK = "[up]\nservices = {services}\nbackoff_first_s = 0.05\nbackoff_ceiling_s = 0.2\n"
@@ -19,30 +17,21 @@ def fleet_of(folder: Path, followers: Sequence[str] = FOLLOWERS, *, toml: str = 
     return fleet_in(folder, QUICK.format(services=str(services).replace("'", '"')) + toml)
 
 
-def drive(fleet: Fleet, drives: Sequence[Rows], *, speed: float, killing: Killing | None = None) -> Sequence[str]:
-    """Who was killed while the drives were replayed into the running fleet; every event is acknowledged then."""
-    killed: Sequence[str] = ()
-    with trigpoint_process(fleet.folder, "up", "--config", fleet.config) as up:
-        fleet.wait_ready("ingest")
-        with vehicles_on_the_road([iter([rows]) for rows in drives], fleet.endpoint, speed=speed) as vehicles:
-            if killing is not None:
-                killed = kill_all(fleet, killing)
-            for vehicle in vehicles:
-                vehicle.join()
-        assert up.stop() == 0, up.err
-    return killed
+def alone(fleet: Fleet, name: str) -> AbstractContextManager[Process]:
+    """One service running on what the log holds, with nobody on its bus."""
+    quiet = ("--set", "bus.mode=peer", "--set", "bus.connect=[]")
+    return trigpoint_process(fleet.folder, "serve", name, "--config", fleet.config, *quiet)
 
 
 def settle(fleet: Fleet, followers: Sequence[str] = FOLLOWERS) -> None:
     """Every service has taken in all there is, one after the other."""
-    with trigpoint_process(fleet.folder, "router", "--config", fleet.config):
-        for name in followers:
-            catch_up(fleet, name)
+    for name in followers:
+        catch_up(fleet, name)
 
 
 def catch_up(fleet: Fleet, name: str) -> None:
     """One service run until it has taken in all there is."""
-    with trigpoint_process(fleet.folder, "serve", name, "--config", fleet.config) as process:
+    with alone(fleet, name) as process:
         wait_until(lambda: process.popen.poll() is not None or has_caught_up(fleet, name), f"{name} caught up")
         assert process.stop() == 0, process.err
 
