@@ -35,6 +35,7 @@ from trigpoint_vehicle.spool_segments import (
 DROP_OLDEST = "drop oldest"
 DAMAGED_SUFFIX = ".damaged"
 LET_GO_SHARE = 4  # a segment that is a quarter full is closed once all of it is released
+HEADS_BYTES = 512  # what goes with a payload at most: its record's head, its channel, its segment's beginning
 NS_PER_S = 1_000_000_000
 
 logger = logging.getLogger(__name__)
@@ -121,7 +122,7 @@ class Spool:
         now_ns = self._now_ns()
         with self._mutex:
             size = len(payload)
-            writer = self._room_for(size + 1024, now_ns, sequence)
+            writer = self._room_for(size + HEADS_BYTES, now_ns, sequence)
             number = self._channels.get(channel, len(self._channels))
             data = encode_record(MESSAGE, number, sequence, stamp_ns, now_ns, payload)
             if channel not in self._channels:
@@ -209,7 +210,7 @@ class Spool:
             self._await(part, messages=-part.messages, payload_bytes=-part.payload_bytes)
         self._await(emptied, messages=-dropped.messages, payload_bytes=-dropped.payload_bytes)
         self.dropped += dropped.messages
-        logger.error("spool of %s is full: %d messages dropped, the oldest", self._vehicle, dropped.messages)
+        logger.error("spool of %s is full: the oldest %d messages dropped", self._vehicle, dropped.messages)
 
     def sync(self) -> None:
         """Everything appended before is durable, and may be read. Raises AppendFailed."""
