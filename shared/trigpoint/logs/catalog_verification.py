@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 
+from trigpoint.logs.absences import Absence
 from trigpoint.logs.catalog import LAYOUT, NAME, UNREADABLE, CatalogDamaged, checked_rows
 from trigpoint.logs.findings import FileSummary, Finding
 from trigpoint.logs.log_files import file_path
@@ -12,17 +13,29 @@ from trigpoint.logs.log_files import file_path
 WRONG, MISSING = "wrong catalog", "missing file"
 
 
-def catalog_findings(directory: Path, files: Sequence[FileSummary]) -> tuple[Finding, ...]:
+def catalog_findings(
+    directory: Path, files: Sequence[FileSummary], absences: Sequence[tuple[str, Absence]]
+) -> tuple[Finding, ...]:
     """What is wrong between a log directory's catalog and its files; nothing where there is no catalog, or one of
-    another layout. A catalog is only read; one that is wrong is made anew when the log is opened next."""
+    another layout. What `absences` say of streams may be gone.
+
+    A catalog is only read; one that is wrong is made anew when the log is opened next.
+    """
     path = directory / NAME
     if not path.is_file():
         return ()
     try:
         with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as connection:
-            return _compared(connection, path, files)
+            found = _compared(connection, path, files)
     except (*UNREADABLE, CatalogDamaged) as error:
         return (Finding(path, 0, WRONG, f"cannot be read: {error}; it is made anew when the log is opened"),)
+    return tuple(one for one in found if one.kind != MISSING or not _recorded(one.path, absences))
+
+
+def _recorded(path: Path, absences: Sequence[tuple[str, Absence]]) -> bool:
+    first = int(path.stem)
+    own = [absence for stream, absence in absences if stream == path.parent.name]
+    return any(absence.first_number <= first < absence.stop_number for absence in own)
 
 
 def _compared(connection: sqlite3.Connection, path: Path, files: Sequence[FileSummary]) -> tuple[Finding, ...]:

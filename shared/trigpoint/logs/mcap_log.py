@@ -151,9 +151,9 @@ class McapLog:
         Raises LogDamaged as `read` does.
         """
         for first, chunks in self._chunks_by_file(stream, _Wanted(0, None, None, None)):
-            channels = self._channels(stream, first)
+            channels = self._channels(stream, first, chunks)
             path = file_path(self.directory / stream, first)
-            with path.open("rb") as file:
+            with _opened(path, chunks) as file:
                 for chunk in chunks:
                     data = _chunk_data(file, path, chunk)
                     indexes = file.read(index_bytes(chunk.count, len(chunk.channel_ids)))
@@ -182,7 +182,7 @@ class McapLog:
     def _read_file(
         self, stream: str, first_number: int, chunks: Sequence[CatalogChunk], wanted: _Wanted
     ) -> Iterator[LoggedEvent]:
-        channels = wanted.channels(self._channels(stream, first_number))
+        channels = wanted.channels(self._channels(stream, first_number, chunks))
         needed = [chunk for chunk in chunks if not channels.keys().isdisjoint(chunk.channel_ids)]
         if not needed:
             return
@@ -193,8 +193,12 @@ class McapLog:
                 self.read_counts.chunks += 1
                 yield from _events(_chunk_data(file, path, chunk), stream, chunk.number, channels, wanted)
 
-    def _channels(self, stream: str, first_number: int) -> dict[int, ChannelKey]:
-        return self._asked(stream, lambda catalog: catalog.channels(stream, first_number))
+    def _channels(self, stream: str, first_number: int, chunks: Sequence[CatalogChunk]) -> dict[int, ChannelKey]:
+        """The channels of a file with these chunks. Raises LogDamaged where the file is gone since they were read."""
+        known = self._asked(stream, lambda catalog: catalog.channels(stream, first_number))
+        if not known.keys() >= {channel_id for chunk in chunks for channel_id in chunk.channel_ids}:
+            raise _taken_away(file_path(self.directory / stream, first_number), chunks)
+        return known
 
     def streams(self) -> tuple[str, ...]:
         """The names of all streams that hold an event, sorted."""
@@ -322,8 +326,12 @@ def _opened(path: Path, chunks: Sequence[CatalogChunk]) -> BinaryIO:
     try:
         return path.open("rb")
     except FileNotFoundError as error:
-        span = f"numbers {chunks[0].number} to {chunks[-1].number + chunks[-1].count - 1}"
-        raise LogDamaged(f"{path}: {span} were taken away while the stream was read") from error
+        raise _taken_away(path, chunks) from error
+
+
+def _taken_away(path: Path, chunks: Sequence[CatalogChunk]) -> LogDamaged:
+    span = f"numbers {chunks[0].number} to {chunks[-1].number + chunks[-1].count - 1}"
+    return LogDamaged(f"{path}: {span} were taken away while the stream was read")
 
 
 def _chunk_data(file: BinaryIO, path: Path, chunk: CatalogChunk) -> bytes:

@@ -157,7 +157,7 @@ def verify(path: Path) -> Verification:
         if numbered:
             verifier.stream(folder, summaries)
         files += summaries
-    verifier.findings += catalog_findings(path, files)
+    verifier.findings += catalog_findings(path, files, verifier.absences)
     if not files and not verifier.absences:
         raise InputError(f"{path}: no {SUFFIX} file there")
     return Verification(tuple(files), verifier.boots(), tuple(verifier.findings), tuple(verifier.absences))
