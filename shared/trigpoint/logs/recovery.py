@@ -144,10 +144,11 @@ def _absences(folder: Path) -> tuple[tuple[Absence, ...], tuple[str, ...]]:
 
 def _salvages(folder: Path, catalog: Catalog, told: Told) -> Iterator[Salvage]:
     numbers = file_numbers(folder)
-    for number, following in zip(numbers, (*numbers[1:], None), strict=True):  # the last may have outgrown the catalog
+    ends = dict(zip(numbers, numbers[1:], strict=False))  # the last may have outgrown the catalog
+    for number in numbers:
         path = file_path(folder, number)
         told(path)
-        yield salvaged(path, stop_number=following, known=_knowledge(catalog, folder.name, number))
+        yield salvaged(path, stop_number=ends.get(number), known=_knowledge(catalog, folder.name, number))
 
 
 def _knowledge(catalog: Catalog, stream: str, number: int) -> Knowledge:
