@@ -6,6 +6,7 @@ import numpy as np
 from trigpoint.errors import InputError
 from trigpoint.events.solved import SolvedMap
 from trigpoint_cli.data_dir import DataDirectory, data_option
+from trigpoint_cli.database import database_options
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering, metres
 from trigpoint_cli.pipeline import Built, build_map
 from trigpoint_evaluation.core.paths import path_length_m
@@ -67,6 +68,7 @@ def built_answer(built: Built) -> Answer:
 
 @click.command("build")
 @data_option
+@database_options
 @click.option("--method", type=click.Choice(METHODS), help="Default: anchored where anchors are, else loose.")
 @click.option("--edges", type=click.Choice(EDGES), help="Default: paper; honest where anchors are tied.")
 @click.option("--image-offsets/--no-image-offsets", default=True, help="Each aerial image has an offset of its own.")

@@ -1,7 +1,7 @@
 """A data directory: where its log, its projections and what was made beside them stand."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,17 +9,23 @@ from typing import Any
 import click
 
 from trigpoint.errors import InputError
-from trigpoint.landmarks.geopackage_store import GeoPackageStore
+from trigpoint.landmarks.opening import geopackage_path, opened_store
+from trigpoint.landmarks.ports import LandmarkStore
 from trigpoint.logs.mcap_log import McapLog
+from trigpoint_cli.database import DATABASE_NAME, EMBEDDED, AskedDatabase, asked_database, database_settings
 
 LOG_NAME = "log"
 
 
 @dataclass(frozen=True, slots=True)
 class DataDirectory:
-    """The paths of a data directory; truth stands apart from what the services see."""
+    """The paths of a data directory; truth stands apart from what the services see.
+
+    `asked` says which landmark database is opened; what it leaves open is as the directory's own configuration says.
+    """
 
     path: Path
+    asked: AskedDatabase = EMBEDDED
 
     @property
     def log(self) -> Path:
@@ -28,8 +34,8 @@ class DataDirectory:
 
     @property
     def database(self) -> Path:
-        """The landmark database."""
-        return self.path / "landmarks.gpkg"
+        """The landmark database, unless another one is configured."""
+        return self.path / DATABASE_NAME
 
     @property
     def report(self) -> Path:
@@ -81,21 +87,20 @@ class DataDirectory:
             log.close()
 
     @contextmanager
-    def opened_database(self, *, read_only: bool) -> Iterator[GeoPackageStore]:
+    def opened_database(self, *, read_only: bool) -> Iterator[LandmarkStore]:
         """The landmark database. Raises InputError where it is not there and only to be read."""
         if read_only and not self.path.is_dir():
             raise InputError(f"{self.path}: no such data directory; `trigpoint ingest` makes one")
-        if read_only and not self.database.is_file():
-            raise InputError(f"{self.database}: no landmark database; `trigpoint build --data {self.path}` makes one")
-        store = GeoPackageStore(self.database, read_only=read_only)
-        try:
+        chosen = database_settings(self.path, self.asked)
+        file = geopackage_path(chosen.url)
+        if read_only and file is not None and not file.is_file():
+            raise InputError(f"{file}: no landmark database; `trigpoint build --data {self.path}` makes one")
+        with closing(opened_store(chosen.url, password_file=chosen.password_file, read_only=read_only)) as store:
             yield store
-        finally:
-            store.close()
 
 
 def _directory(context: click.Context, parameter: click.Parameter, value: Path) -> DataDirectory:
-    return DataDirectory(value)
+    return DataDirectory(value, asked_database(context))
 
 
 data_option: Callable[[Any], Any] = click.option(

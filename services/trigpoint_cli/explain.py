@@ -5,6 +5,7 @@ from dataclasses import asdict
 import click
 
 from trigpoint_cli.data_dir import DataDirectory, as_of_option, data_option
+from trigpoint_cli.database import database_options
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering, metres, utc
 from trigpoint_evaluation.core.explanation import Explanation, LoggedCorrection, Move, Sighting, TiedAnchor
 from trigpoint_evaluation.explaining import explained
@@ -15,6 +16,7 @@ LISTED = 20  # lines of one kind on a screen; --json has all
 @click.command("explain")
 @click.argument("landmark")
 @data_option
+@database_options
 @as_of_option
 @answering
 def command(landmark: str, data: DataDirectory, as_of: int | None, *, screen: Screen) -> Answer:

@@ -7,6 +7,7 @@ import click
 from trigpoint.errors import InputError
 from trigpoint.landmarks.queries import LandmarkQuery
 from trigpoint_cli.data_dir import DataDirectory, as_of_option, data_option
+from trigpoint_cli.database import database_options
 from trigpoint_cli.output import Answer, Screen, answering, plain
 from trigpoint_landmarks.core.questions import bbox_of, near_of
 from trigpoint_landmarks.core.rendering import feature_collection, landmark_list
@@ -14,6 +15,7 @@ from trigpoint_landmarks.core.rendering import feature_collection, landmark_list
 
 @click.command("landmarks")
 @data_option
+@database_options
 @click.option("--bbox", metavar="LON_MIN,LAT_MIN,LON_MAX,LAT_MAX", help="Only inside this box, in degrees.")
 @click.option("--near", metavar="LAT,LON", help="Only near this position, in degrees; nearest first.")
 @click.option("--radius-m", type=float, metavar="R", help="How near, in metres on the ground; goes with --near.")

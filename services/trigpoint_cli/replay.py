@@ -3,6 +3,7 @@
 import click
 
 from trigpoint_cli.data_dir import DataDirectory, data_option
+from trigpoint_cli.database import database_options
 from trigpoint_cli.output import Answer, Screen, answering
 from trigpoint_landmarks.app import replay_difference
 
@@ -11,6 +12,7 @@ LISTED = 20  # differences said in full
 
 @click.command("replay")
 @data_option
+@database_options
 @answering
 def command(data: DataDirectory, *, screen: Screen) -> Answer:
     """Rebuild every projection from the log and say whether anything differs (then status 2)."""
