@@ -1,7 +1,5 @@
 """What commands that correct the map have in common: who says so and why, and what came of it."""
 
-import os
-import pwd
 import time
 from collections.abc import Callable
 from dataclasses import asdict
@@ -12,6 +10,7 @@ import click
 from trigpoint_cli.output import Answer
 from trigpoint_ingest.anchors import CORRECTIONS_STREAM
 from trigpoint_ingest.corrections import Attribution, CorrectionReport
+from trigpoint_ingest.settings import operating_user
 
 
 def attribution_options(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -19,14 +18,6 @@ def attribution_options(function: Callable[..., Any]) -> Callable[..., Any]:
     who = click.option("--author", metavar="NAME", help="Who says so; the user this runs as by default.")(function)
     why: Callable[..., Any] = click.option("--reason", default="", metavar="TEXT", help="Why.")(who)
     return why
-
-
-def operating_user() -> str:
-    """The name of the user this process runs as, as the system has it and not as the environment says."""
-    try:
-        return pwd.getpwuid(os.getuid()).pw_name
-    except KeyError:
-        return f"user {os.getuid()}"
 
 
 def attributed(author: str | None, reason: str) -> Attribution:
