@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import click
 
 from trigpoint.errors import InputError, TrigpointError
+from trigpoint.observability.log_lines import logs_lines
 from trigpoint.observability.masking import without_password
 from trigpoint_cli.output import CommandIncomplete
 
@@ -88,7 +89,10 @@ def run(words: Sequence[str]) -> int:
 def _ended(error: Exception, *, as_json: bool) -> int:
     """The exit status of an error, after saying it in one line."""
     status, line = _status_of(error), _line_of(error)
-    click.echo(f"trigpoint: {line}", err=True)
+    if logs_lines():
+        logging.getLogger(__name__).critical("%s", line, extra={"exit_status": status})
+    else:
+        click.echo(f"trigpoint: {line}", err=True)
     if as_json:
         answer = error.answer if isinstance(error, CommandIncomplete) else {}
         try:

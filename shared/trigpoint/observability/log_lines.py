@@ -86,3 +86,8 @@ def log_to(
     root.setLevel(level)
     for name in TALKATIVE:
         logging.getLogger(name).setLevel(logging.WARNING)
+
+
+def logs_lines() -> bool:
+    """Whether the process logs as `log_to` has it."""
+    return any(isinstance(handler.formatter, LineFormatter) for handler in logging.getLogger().handlers)

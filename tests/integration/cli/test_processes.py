@@ -122,3 +122,5 @@ def test_a_service_that_keeps_failing_shows_in_the_health_of_up_and_the_others_g
         assert told["processes"]["ingest"]["last_status"] == 2
         assert fleet.is_ready("router")
         assert up.stop() == 0
+    reasons = [line["message"] for line in up.logged() if line["level"] == "CRITICAL"]
+    assert f"{fleet.data}/log: no log can be opened here" in reasons[0]
