@@ -318,10 +318,10 @@ def parsed_manifest(name: str, text: str) -> Manifest:
     """The manifest of a TOML text. Raises InputError naming every key that is wrong."""
     try:
         return Manifest.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{name}: not TOML: {error}") from None
     except ValidationError as error:
         raise InputError(f"{name}: {'; '.join(map(_complaint, error.errors()))}") from None
+    except (ValueError, RecursionError) as error:  # no TOML, numbers of thousands of digits, brackets without end
+        raise InputError(f"{name}: not TOML: {error}") from None
 
 
 def _complaint(error: object) -> str:

@@ -92,7 +92,7 @@ def read_register(path: Path) -> Register:
         for row in rows:
             valid_name(row.name)
             valid_name(row.common_name)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"register {path} cannot be read: {error}") from error
     return Register(rows)
 

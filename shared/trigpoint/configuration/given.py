@@ -36,7 +36,7 @@ def from_toml(path: Path) -> Layer:
         raise InputError(f"{path}: {len(content)} bytes are no configuration; at most {SIZE_LIMIT}")
     try:
         tables = tomllib.loads(content.decode("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # no text, no TOML, endless digits or brackets
         raise InputError(f"{path}: no TOML: {error}") from error
     return {key: Given(value=value, origin=str(path), is_text=False) for key, value in _flat(tables)}
 
