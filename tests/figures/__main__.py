@@ -16,6 +16,7 @@ GROUPS: Mapping[str, Sequence[Figure]] = {
     "nclt": nclt.FIGURES,
     "campus": campus.FIGURES,
     "demo": demo.FIGURES,
+    "faults": faults_log.FIGURES,
     "faults": (*faults_services.FIGURES,),
     "security": security.FIGURES,
 }
