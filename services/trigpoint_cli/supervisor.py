@@ -4,13 +4,11 @@ import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 from trigpoint.configuration.sections import UpSettings
 from trigpoint.observability.endpoint import Status
 from trigpoint.observability.metrics import Instruments
-from trigpoint_cli.children import Child
-from trigpoint_cli.stopping import StopRequests
 from trigpoint_cli.supervision import Life, after_end, after_start, is_failing
 
 LOOK_S = 0.1  # between two looks at the processes
@@ -20,11 +18,32 @@ Clock = Callable[[], float]
 logger = logging.getLogger(__name__)
 
 
+class Requests(Protocol):
+    """Who may tell the supervisor to stop."""
+
+    def wait(self, timeout_s: float) -> str | None:
+        """Why to stop, or None if there was no reason within the timeout."""
+
+
+class Supervised(Protocol):
+    """A process that was started."""
+
+    @property
+    def pid(self) -> int:
+        """Its process id."""
+
+    def status(self) -> int | None:
+        """Its exit status, or None while it runs."""
+
+    def stop(self, limit_s: float) -> bool:
+        """Whether it ended within the limit after being asked to; if not, it was killed."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Machine:
     """How processes are started and asked here, by name."""
 
-    start: Callable[[str], Child]
+    start: Callable[[str], Supervised]
     is_ready: Callable[[str], bool]
 
 
@@ -36,11 +55,11 @@ class Supervisor:
     ) -> None:
         self._settings, self._machine, self._instruments, self._now_s = settings, machine, instruments, now_s
         self._lives: dict[str, Life] = {name: Life() for name in settings.services}
-        self._children: dict[str, Child] = {}
+        self._children: dict[str, Supervised] = {}
         self._came_up: set[str] = set()
         self.killed: list[str] = []
 
-    def run(self, requests: StopRequests) -> str:
+    def run(self, requests: Requests) -> str:
         """Why it was told to stop; the processes have ended then."""
         try:
             while (reason := requests.wait(LOOK_S)) is None:
