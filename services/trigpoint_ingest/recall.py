@@ -23,6 +23,8 @@ def admission_from(log: RecallingLog, settings: IngestSettings) -> Admission:
     own = {STREAM_PATTERNS[VehicleDescribed].format(vehicle=vehicle) for vehicle in settings.vehicles}
     for stream in vehicle_streams(log):
         if not own or stream in own:
+            for boot in (boot for absence in log.absences(stream) for boot in absence.boots):
+                admission.recall_retained(boot.source, boot.boot_id, boot.ranges)
             for run in log.read_headers(stream):
                 admission.recall_run(run)
     for row in log.read(REFUSED_STREAM, kinds=(EventRefused,)):

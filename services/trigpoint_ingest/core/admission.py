@@ -1,6 +1,6 @@
 """What is in the log already, and what may still come in: the memory of ingest, rebuilt from the log on start."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -112,6 +112,12 @@ class Admission:
         stamps = self._stamps.setdefault(drive, DriveStamps())
         if of_sensor:
             stamps.accept_run(np.concatenate(list(of_sensor.values())), of_sensor)
+
+    def recall_retained(self, source: str, boot_id: str, ranges: Sequence[tuple[int, int]]) -> None:
+        """Events that were in the log and were taken out of it: accepted once, and their drive described."""
+        for start, stop in ranges:
+            self._accepted.add_range(source, boot_id, start=start, stop=stop)
+        self._described.add((source, boot_id))
 
     def _take(self, envelope: Envelope[Observed], drive: Drive, stamps: DriveStamps) -> None:
         self._accepted.add(envelope.identity)

@@ -8,6 +8,7 @@ from trigpoint.events.codec import Event
 from trigpoint.events.envelope import Envelope, LogPosition
 from trigpoint.events.runs import EncodedRun
 from trigpoint.events.solved import SolvedMap
+from trigpoint.logs.absences import Absence
 from trigpoint.logs.ports import EventLog, LoggedBoot, LoggedEvent
 
 
@@ -48,6 +49,11 @@ class LogAsOf:
     def begins_at(self, stream: str) -> int:
         """The number of the oldest event that is still there, or of the next one that was to come."""
         return min(self._log.begins_at(stream), self._counts.get(stream, 0))
+
+    def absences(self, stream: str) -> tuple[Absence, ...]:
+        """What is not there any more of what was there then."""
+        count = self._counts.get(stream, 0)
+        return tuple(absence for absence in self._log.absences(stream) if absence.first_number < count)
 
     def boots(self, stream: str) -> tuple[LoggedBoot, ...]:
         """The boots of a stream that had any event then; times as they are now."""

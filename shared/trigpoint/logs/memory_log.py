@@ -8,6 +8,7 @@ import numpy as np
 from trigpoint.events.codec import Event, schema_name
 from trigpoint.events.envelope import Envelope, LogPosition
 from trigpoint.events.runs import EncodedRun, envelopes
+from trigpoint.logs.absences import Absence
 from trigpoint.logs.channels import packed_rows
 from trigpoint.logs.log_files import valid_stream
 from trigpoint.logs.ports import LoggedBoot, LoggedEvent
@@ -75,6 +76,10 @@ class MemoryLog:
     def begins_at(self, stream: str) -> int:
         """The number of the oldest event: 0, since nothing is ever taken away."""
         return 0
+
+    def absences(self, stream: str) -> tuple[Absence, ...]:
+        """Nothing: nothing is ever taken away."""
+        return ()
 
     def boots(self, stream: str) -> tuple[LoggedBoot, ...]:
         """The boots with events in a stream, in order of time."""

@@ -7,6 +7,7 @@ from typing import Protocol
 from trigpoint.events.codec import Event
 from trigpoint.events.envelope import Envelope, LogPosition
 from trigpoint.events.runs import EncodedRun
+from trigpoint.logs.absences import Absence
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +56,9 @@ class EventLog(Protocol):
     def begins_at(self, stream: str) -> int:
         """The number of the oldest event of a stream: not 0 where older ones were retained away; the next number
         where there is none."""
+
+    def absences(self, stream: str) -> tuple[Absence, ...]:
+        """What of a stream is not there any more, and why, by number. Raises LogDamaged where that record is."""
 
     def boots(self, stream: str) -> tuple[LoggedBoot, ...]:
         """The boots with events in a stream, in order of time; no event is read for it, and the range may be wider than
