@@ -6,6 +6,8 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from trigpoint.bus.event_messages import event_message
 from trigpoint.bus.ports import Bus, BusMessage, BusRun
 from trigpoint.errors import AppendFailed
@@ -100,14 +102,14 @@ class GroupCommit:
                     bus.publish(event_message(row, key=key))
 
     def _bus_runs(self, run: EncodedRun) -> list[BusRun]:
-        """The run as it is published: each class of events on its key."""
+        """The run as it is published: each class of events on its key. A schema no row has may be anything."""
         runs = []
-        for number, schema in enumerate(run.schemas):
-            kind = event_class(schema)
+        for number in np.unique(run.schema_of_row).tolist():
+            kind = event_class(run.schemas[number])
             if kind is not None:
                 key = observation_key(run.source, kind, root=self._settings.root)
                 runs.append(BusRun(key, 1, of_schema(run, number)))
-        return [found for found in runs if len(found.run)]
+        return runs
 
 
 def _is_heard(bus: Bus, key: str, heard: dict[str, bool]) -> bool:
