@@ -6,8 +6,8 @@ from typing import Generic, TypeVar
 
 ItemT = TypeVar("ItemT")
 
-INBOX_CAPACITY = 65_536  # messages; at 100 B each some 20 MB, half a second of the fastest vehicle replay
-INBOX_BYTES = 256 * 1024 * 1024  # of payload; what counts where messages are large, as point clouds are
+INBOX_CAPACITY = 1_048_576  # messages: the windows of 128 vehicles' publishers
+INBOX_BYTES = 256 * 1024 * 1024  # what they take in memory: the windows of 16 vehicles that send point clouds
 
 
 class Inbox(Generic[ItemT]):

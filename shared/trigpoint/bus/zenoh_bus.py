@@ -22,6 +22,7 @@ from trigpoint.errors import ServiceError
 PROTOBUF = "application/protobuf"
 BUNDLE_COUNT = 256  # messages in a transmission: some 15 kB of IMU, below the 64 kB a Zenoh batch holds
 BUNDLE_BYTES = 64 * 1024  # of payload in a transmission of more than one message
+ARRIVAL_BYTES = 512  # a transmission in memory, besides its payload
 CLAIM_LOOK_S = 5.0  # for the claims of everyone reachable; the answer comes in milliseconds
 
 
@@ -82,7 +83,7 @@ class ZenohSubscription:
         attachment = attached.to_bytes() if attached is not None else b""
         schema_name = str(sample.encoding).partition(";")[2]
         arrival = Arrival(str(sample.key_expr), schema_name, sample.payload.to_bytes(), attachment)
-        self._inbox.offer(arrival, count=arrival.count, size_bytes=len(arrival.payload))
+        self._inbox.offer(arrival, count=arrival.count, size_bytes=len(arrival.payload) + ARRIVAL_BYTES)
 
     @property
     def lost(self) -> int:
