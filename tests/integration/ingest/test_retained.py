@@ -35,9 +35,7 @@ def admission(tmp_path: Path) -> Admission:
 def test_an_event_sent_again_is_a_duplicate_whether_it_is_still_there_or_not(
     admission: Admission, sequence: int
 ) -> None:
-    message = RawMessage(
-        "veh/van/obs/imu", "trigpoint.v1.ImuMeasured", b"", EventIdentity("van", "boot-1", sequence), 0
-    )
+    message = RunMessage("trigpoint.v1.ImuMeasured", b"", EventIdentity("van", "boot-1", sequence), 0)
     assert admission.admit(message) is None
 
 
