@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from figures import campus, demo, faults_log, faults_services, mrclam, nclt, security, victoria_park
+from figures import campus, demo, faults_link, faults_log, faults_services, mrclam, nclt, security, victoria_park
 from figures.figure import Figure, json_line, measured_lines
 from figures.workbench import Workbench
 
@@ -16,7 +16,7 @@ GROUPS: Mapping[str, Sequence[Figure]] = {
     "nclt": nclt.FIGURES,
     "campus": campus.FIGURES,
     "demo": demo.FIGURES,
-    "faults": (*faults_log.FIGURES, *faults_services.FIGURES),
+    "faults": (*faults_link.FIGURES, *faults_log.FIGURES, *faults_services.FIGURES),
     "security": security.FIGURES,
 }
 PROGRAM = (str(Path(sys.executable).with_name("trigpoint")),)

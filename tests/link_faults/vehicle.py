@@ -1,0 +1,44 @@
+"""`python -m link_faults.vehicle`: a vehicle's program, which writes down what its publisher took before it goes on."""
+
+import argparse
+import os
+import signal
+import sys
+import threading
+import time
+from pathlib import Path
+
+from trigpoint.bus.zenoh_bus import ZenohSettings
+from trigpoint.events.observed import ImuMeasured, VehicleDescribed
+from trigpoint_vehicle.publisher import VehiclePublisher
+from trigpoint_vehicle.settings import VehicleSettings
+
+
+def main() -> None:
+    """Sends at a rate until SIGTERM, then until everything is acknowledged; killed, it just ends."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--vehicle", required=True)
+    parser.add_argument("--spool", type=Path, required=True)
+    parser.add_argument("--connect", required=True)
+    parser.add_argument("--rate-hz", type=float, required=True)
+    parser.add_argument("--taken", type=Path, required=True)
+    options = parser.parse_args()
+    stop = threading.Event()
+    signal.signal(signal.SIGTERM, lambda *_: stop.set())
+    taken = os.open(options.taken, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+    bus = ZenohSettings(connect=(options.connect,))
+    with VehiclePublisher(options.vehicle, options.spool, bus, VehicleSettings()) as publisher:
+        identity = publisher.describe(VehicleDescribed(vehicle=options.vehicle), stamp_ns=time.time_ns())
+        began_s, count = time.monotonic(), 0
+        while not stop.is_set():
+            os.write(taken, f"{identity.boot_id} {identity.sequence}\n".encode())
+            count += 1
+            stop.wait(max(began_s + count / options.rate_hz - time.monotonic(), 0.0))
+            event = ImuMeasured(yaw_rate_radps=0.0, acceleration_x_mps2=1e-6 * count, acceleration_y_mps2=0.0)
+            identity = publisher.send(event, stamp_ns=time.time_ns())
+        os.write(taken, f"{identity.boot_id} {identity.sequence}\n".encode())
+        sys.exit(0 if publisher.flush(300.0) else 1)
+
+
+if __name__ == "__main__":
+    main()
