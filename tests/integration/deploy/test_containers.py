@@ -42,7 +42,7 @@ def service(name: str) -> dict[str, Any]:
 def settings_of(name: str) -> Settings:
     """The configuration as a container's process has it."""
     environment = service(name).get("environment", {})
-    return configured(Settings, [from_toml(DEPLOY / "trigpoint.toml"), from_environment(environment)]).settings
+    return configured(Settings, [from_toml(DEPLOY / "containers.toml"), from_environment(environment)]).settings
 
 
 def secret_paths(name: str) -> set[str]:
@@ -206,7 +206,7 @@ def test_the_start_script_becomes_a_command_that_there_is(tmp_path: Path, name: 
         pid, *given = started.communicate()[0].splitlines()
     assert int(pid) == started.pid  # in place of the shell: signals reach it
     assert given[-2:] == ["--config", f"{service(name)['configs'][0]['target']}"]
-    assert trigpoint(*given[:-2], "--config", DEPLOY / "trigpoint.toml", "--help").status == 0
+    assert trigpoint(*given[:-2], "--config", DEPLOY / "containers.toml", "--help").status == 0
 
 
 def test_the_comment_before_the_first_start_names_commands_that_there_are() -> None:
