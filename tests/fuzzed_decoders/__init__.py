@@ -1,0 +1,1 @@
+"""Every decoder of what comes from outside, fed with bytes that nobody meant."""
