@@ -6,7 +6,18 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from figures import campus, demo, faults_link, faults_log, faults_services, mrclam, nclt, security, victoria_park
+from figures import (
+    campus,
+    demo,
+    faults_link,
+    faults_log,
+    faults_services,
+    mrclam,
+    nclt,
+    security,
+    security_fuzz,
+    victoria_park,
+)
 from figures.figure import Figure, json_line, measured_lines
 from figures.workbench import Workbench
 
@@ -17,7 +28,7 @@ GROUPS: Mapping[str, Sequence[Figure]] = {
     "campus": campus.FIGURES,
     "demo": demo.FIGURES,
     "faults": (*faults_link.FIGURES, *faults_log.FIGURES, *faults_services.FIGURES),
-    "security": security.FIGURES,
+    "security": (*security.FIGURES, *security_fuzz.FIGURES),
 }
 PROGRAM = (str(Path(sys.executable).with_name("trigpoint")),)
 
