@@ -8,13 +8,13 @@ from io import BytesIO
 from itertools import chain
 from typing import NamedTuple, Protocol, TypeVar
 
+import lz4.frame  # type: ignore[import-untyped]  # ships no types
 import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, McapRecord, Schema
-from mcap.stream_reader import get_chunk_data_stream
 from numpy.typing import NDArray
 
 from trigpoint.errors import LogDamaged
@@ -29,7 +29,7 @@ _HEADS = np.dtype(  # many of MESSAGE, in the same bytes
     [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log", "<u8"), ("publish", "<u8")]
 )
 COMPRESSION = "zstd"
-CHUNK_LIMIT_BYTES = 1 << 30  # what a damaged header may make us allocate; writers use some megabytes
+CHUNK_LIMIT_BYTES = 128 * 1024 * 1024  # unpacked: what a header may make us allocate; writers use some megabytes
 COMPRESSION_LEVEL = 3  # zstd's own default: the ratio hardly grows above it on packed doubles
 
 
@@ -140,19 +140,33 @@ def unpacked(chunk: Chunk, *, checksum_required: bool) -> bytes:
     Raises LogDamaged for a wrong checksum or size, or more than CHUNK_LIMIT_BYTES.
     """
     try:
-        compressed = chunk.compression == COMPRESSION
-        said = (chunk.uncompressed_size, zstandard.frame_content_size(chunk.data) if compressed else 0)
-        if max(said) > CHUNK_LIMIT_BYTES:
-            raise LogDamaged(f"chunk says it holds {max(said)} bytes, at most {CHUNK_LIMIT_BYTES} are unpacked")
-        stream, size = get_chunk_data_stream(chunk, validate_crc=False)
-        data: bytes = stream.read(size)
-    except (McapError, zstandard.ZstdError, RuntimeError, EOFError, OverflowError) as error:
+        data = _decompressed(chunk)
+    except (zstandard.ZstdError, RuntimeError, EOFError, OverflowError, MemoryError) as error:
         raise LogDamaged(f"chunk of {len(chunk.data)} bytes does not decompress: {error}") from error
-    if size != chunk.uncompressed_size:
-        raise LogDamaged(f"chunk holds {size} bytes, its header says {chunk.uncompressed_size}")
+    if len(data) != chunk.uncompressed_size:
+        raise LogDamaged(f"chunk holds {len(data)} bytes, its header says {chunk.uncompressed_size}")
     if (chunk.uncompressed_crc or checksum_required) and zlib.crc32(data) != chunk.uncompressed_crc:
         raise LogDamaged(f"chunk has checksum {zlib.crc32(data):08x}, its header says {chunk.uncompressed_crc:08x}")
     return data
+
+
+def _decompressed(chunk: Chunk) -> bytes:
+    """Never more than the header says, and that never more than CHUNK_LIMIT_BYTES: nothing larger is allocated."""
+    _within_limit(chunk.uncompressed_size)
+    if chunk.compression == "zstd":
+        _within_limit(zstandard.frame_content_size(chunk.data))
+        return zstandard.decompress(chunk.data, max_output_size=chunk.uncompressed_size)
+    if chunk.compression == "lz4":
+        data: bytes = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=chunk.uncompressed_size)
+        return data
+    if chunk.compression:
+        raise LogDamaged(f"chunk is compressed with {chunk.compression!r}: zstd, lz4 or nothing is read")
+    return chunk.data
+
+
+def _within_limit(size_bytes: int) -> None:
+    if size_bytes > CHUNK_LIMIT_BYTES:
+        raise LogDamaged(f"chunk says it holds {size_bytes} bytes, at most {CHUNK_LIMIT_BYTES} are unpacked")
 
 
 def messages(data: bytes) -> Iterator[ChunkMessage]:
@@ -180,18 +194,18 @@ def _end_of_definition(data: bytes, offset: int) -> int:
     return following
 
 
-def definitions(data: bytes) -> tuple[tuple[Schema, ...], tuple[Channel, ...]]:
-    """The schemas and channels among a chunk's records. Raises LogDamaged for one that cannot be read."""
-    schemas, channels = [], []
+def definitions(data: bytes) -> Iterator[tuple[Schema | Channel, int]]:
+    """The schemas and channels among a chunk's records, each with its size in bytes, in order.
+
+    Raises LogDamaged for one that cannot be read.
+    """
     offset = 0
     while offset + FRAME.size <= len(data):
         opcode, length = FRAME.unpack_from(data, offset)
         if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             body = data[offset + FRAME.size : offset + FRAME.size + length]
-            schemas += [parsed(Schema, body)] if opcode == Opcode.SCHEMA else []
-            channels += [parsed(Channel, body)] if opcode == Opcode.CHANNEL else []
+            yield parsed(Schema, body) if opcode == Opcode.SCHEMA else parsed(Channel, body), length
         offset += FRAME.size + length
-    return tuple(schemas), tuple(channels)
 
 
 def message_indexes(data: bytes) -> MessageIndexes:

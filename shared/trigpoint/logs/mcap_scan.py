@@ -4,28 +4,38 @@ A wrong checksum loses its chunk only. Where a record's length makes no sense th
 checks is looked for. Channels come from the summary, if that is whole, and from the chunks otherwise.
 """
 
+import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, DataEnd, Footer, Header, MessageIndex, Metadata, MetadataIndex, Schema
+from mcap.records import Channel, Chunk, DataEnd, Footer, Header, Metadata, MetadataIndex, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from trigpoint.errors import LogDamaged
 from trigpoint.logs.channels import ChannelKey, channel_key
-from trigpoint.logs.chunks import FRAME, definitions, messages, parsed, record_bytes, unpacked
+from trigpoint.logs.chunks import CHUNK_LIMIT_BYTES, FRAME, definitions, messages, parsed, record_bytes, unpacked
 from trigpoint.logs.file_bytes import FileBytes
 from trigpoint.logs.mcap_writer import LIBRARY
 
 MAGIC = bytes(MCAP0_MAGIC)
 FOOTER_BYTES = FRAME.size + 8 + 8 + 4
 DATA_END_BYTES = FRAME.size + 4
+INDEX_HEAD_BYTES = FRAME.size + 2 + 4  # up to the entries of a message index: channel and their size in bytes
+INDEX_SIZE = struct.Struct("<I")
 CHUNK_HEAD_BYTES = FRAME.size + 8 + 8 + 8 + 4  # up to the name of the compression
 COMPRESSION_NAMES = (b"\x04\x00\x00\x00zstd", b"\x03\x00\x00\x00lz4")
 KNOWN_OPCODES = frozenset(int(opcode) for opcode in Opcode)
 PRIVATE_OPCODES = 0x80  # this and above: an application's own, to be skipped
 UNKNOWN = -1  # messages lost
+RECORD_LIMIT_BYTES = CHUNK_LIMIT_BYTES + 1024 * 1024  # of one that is read: what does not compress fits in
+DEFINITIONS_LIMIT_BYTES = 64 * 1024 * 1024  # of all schemas, channels and metadata of a file
+SUMMARY_LIMIT_BYTES = RECORD_LIMIT_BYTES
+METADATA_LIMIT, DAMAGES_LIMIT = 10_000, 1_000  # records; entries, the last of which stands for all behind it
+READ_OPCODES = frozenset(
+    {Opcode.CHUNK, Opcode.MESSAGE, Opcode.DATA_END, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA}
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +82,7 @@ class McapScan:
         self._checksums_required = False
         self.summary_fault = "no summary was read"  # "" for a whole one
         self._channels_settled = False  # by the summary
+        self._kept_bytes = 0  # of definitions and metadata
         self._lost_chunk = False  # the last chunk was damaged: its message indexes tell its count
 
     @property
@@ -121,14 +132,17 @@ class McapScan:
         if following > content.size_bytes:
             self._damaged(offset, f"record {opcode} of {length} bytes reaches past the end at {content.size_bytes}")
             return offset
+        if opcode in READ_OPCODES and length > RECORD_LIMIT_BYTES:
+            self._damaged(offset, f"record {opcode} of {length} bytes, at most {RECORD_LIMIT_BYTES} are read")
+            return offset
         if opcode not in KNOWN_OPCODES and opcode < PRIVATE_OPCODES:
             self._damaged(offset, f"record of {length} bytes has the unknown opcode {opcode}")
             return offset
         return following
 
     def _record(self, content: FileBytes, offset: int, following: int) -> Iterator[ScannedChunk]:
-        record = content.read(offset, following)
-        opcode = record[0]
+        opcode = content.read(offset, offset + 1)[0]
+        record = content.read(offset, following if opcode in READ_OPCODES else offset + INDEX_HEAD_BYTES)
         try:
             if opcode in (Opcode.CHUNK, Opcode.MESSAGE):
                 self._lost_chunk = False
@@ -137,7 +151,7 @@ class McapScan:
             elif opcode == Opcode.DATA_END:
                 self._end_of_data(content, offset, following)
             else:
-                self._side_record(record, offset)
+                self._side_record(record, offset, following - offset)
         except LogDamaged as error:
             self._lost_chunk = self._lost_chunk or opcode == Opcode.CHUNK
             self._damaged(offset, str(error), lost=UNKNOWN if opcode in (Opcode.CHUNK, Opcode.MESSAGE) else 0)
@@ -148,43 +162,63 @@ class McapScan:
             return ScannedChunk(offset, len(record), message.log_time_ns, message.log_time_ns, record)
         chunk = parsed(Chunk, record[FRAME.size :])
         data = unpacked(chunk, checksum_required=self._checksums_required)
-        stamps_ns = [message.log_time_ns for message in messages(data)]
-        held = min(stamps_ns, default=0), max(stamps_ns, default=0)
+        count, held = 0, (0, 0)
+        for message in messages(data):
+            stamp_ns = message.log_time_ns
+            held = (min(held[0], stamp_ns), max(held[1], stamp_ns)) if count else (stamp_ns, stamp_ns)
+            count += 1
         self._learn(data)
-        if stamps_ns and held != (chunk.message_start_time, chunk.message_end_time):
+        if count and held != (chunk.message_start_time, chunk.message_end_time):
             said = f"[{chunk.message_start_time}, {chunk.message_end_time}]"
             self._damaged(offset, f"chunk's header says times {said} ns, its messages have {list(held)}", lost=0)
         return ScannedChunk(offset, len(record), *held, data)
 
-    def _side_record(self, record: bytes, offset: int) -> None:
+    def _side_record(self, record: bytes, offset: int, length: int) -> None:
         opcode, body = record[0], record[FRAME.size :]
         if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             self._learn(record)
         elif opcode == Opcode.METADATA:
             metadata = parsed(Metadata, body)
+            self._keep(length)
+            if len(self.metadata_indexes) >= METADATA_LIMIT:
+                raise LogDamaged(f"more than {METADATA_LIMIT} metadata records: not kept")
             self.metadata[metadata.name] = metadata.metadata
-            self.metadata_indexes.append(MetadataIndex(offset=offset, length=len(record), name=metadata.name))
+            self.metadata_indexes.append(MetadataIndex(offset=offset, length=length, name=metadata.name))
         elif opcode == Opcode.MESSAGE_INDEX and self._lost_chunk:
-            self._count_lost(len(parsed(MessageIndex, body).records))
+            self._count_lost(index_count(record, length))
 
     def _count_lost(self, count: int) -> None:
         """A message index after a damaged chunk says how many messages of one channel it held."""
         damage = self.damages[-1]
-        self.damages[-1] = replace(damage, lost_messages=max(damage.lost_messages, 0) + count)
+        if len(self.damages) < DAMAGES_LIMIT:
+            self.damages[-1] = replace(damage, lost_messages=max(damage.lost_messages, 0) + count)
 
     def _learn(self, records: bytes) -> None:
         """Schemas and channels taken over, unless the summary has settled them. Raises LogDamaged."""
-        schemas, channels = definitions(records)
-        if self._channels_settled:
-            return
-        self.schemas |= {schema.id: schema for schema in schemas}
-        for channel in channels:
-            schema = self.schemas.get(channel.schema_id)
-            try:
-                self.channels[channel.id] = channel_key(channel, schema_name=schema.name if schema else "")
-            except ValueError as error:
-                raise LogDamaged(f"channel {channel.id} has no number as its sequence base: {error}") from error
-            self.channel_records[channel.id] = channel
+        for definition, length in definitions(records):
+            if self._channels_settled:
+                continue
+            if isinstance(definition, Schema):
+                if self.schemas.get(definition.id) != definition:
+                    self._keep(length)
+                self.schemas[definition.id] = definition
+            elif self.channel_records.get(definition.id) != definition:
+                self._keep(length)
+                self._learn_channel(definition)
+
+    def _learn_channel(self, channel: Channel) -> None:
+        schema = self.schemas.get(channel.schema_id)
+        try:
+            self.channels[channel.id] = channel_key(channel, schema_name=schema.name if schema else "")
+        except ValueError as error:
+            raise LogDamaged(f"channel {channel.id} has no number as its sequence base: {error}") from error
+        self.channel_records[channel.id] = channel
+
+    def _keep(self, length: int) -> None:
+        """So many bytes more of definitions and metadata in memory. Raises LogDamaged for too many."""
+        if self._kept_bytes + length > DEFINITIONS_LIMIT_BYTES:
+            raise LogDamaged(f"definitions of {self._kept_bytes + length} bytes, at most {DEFINITIONS_LIMIT_BYTES}")
+        self._kept_bytes += length
 
     def _next_chunk(self, content: FileBytes, offset: int) -> int:
         """Where the next chunk that checks starts, or the file's end."""
@@ -199,9 +233,10 @@ class McapScan:
 
     def _end_of_data(self, content: FileBytes, offset: int, following: int) -> None:
         said = parsed(DataEnd, content.read(offset + FRAME.size, following)).data_section_crc
-        held = content.checksum(0, offset)
-        if said != held and (said or self._checksums_required) and not self.damages:
-            self._damaged(offset, f"data section has checksum {held:08x}, its end says {said:08x}", lost=0)
+        if (said or self._checksums_required) and not self.damages:
+            held = content.checksum(0, offset)
+            if said != held:
+                self._damaged(offset, f"data section has checksum {held:08x}, its end says {said:08x}", lost=0)
         self.finished = True
         if self.summary_fault:
             self._damaged(following, self.summary_fault, lost=0)
@@ -216,6 +251,8 @@ class McapScan:
         start, said = footer.summary_start or footer_start, footer.summary_crc
         if not len(MAGIC) + DATA_END_BYTES <= start <= footer_start:
             return f"summary starts at {start}, its footer at {footer_start}"
+        if footer_start - start > SUMMARY_LIMIT_BYTES:
+            return f"summary of {footer_start - start} bytes, at most {SUMMARY_LIMIT_BYTES} are read"
         held = content.checksum(start, content.size_bytes - len(MAGIC) - 4)
         if said != held and (said or self._checksums_required):
             return f"summary has checksum {held:08x}, the footer says {said:08x}"
@@ -229,7 +266,18 @@ class McapScan:
         return ""
 
     def _damaged(self, offset: int, reason: str, *, lost: int = UNKNOWN) -> None:
-        self.damages.append(Damage(self.path, offset, reason, lost))
+        if len(self.damages) < DAMAGES_LIMIT:
+            self.damages.append(Damage(self.path, offset, reason, lost))
+        elif len(self.damages) == DAMAGES_LIMIT:
+            self.damages.append(Damage(self.path, offset, f"{reason}; what follows is not listed"))
+
+
+def index_count(head: bytes, length: int) -> int:
+    """How many messages an index record of `length` bytes that begins with `head` lists. Raises LogDamaged."""
+    listed = length - INDEX_HEAD_BYTES
+    if len(head) < INDEX_HEAD_BYTES or listed != INDEX_SIZE.unpack_from(head, INDEX_HEAD_BYTES - 4)[0] or listed % 16:
+        raise LogDamaged(f"message index of {length} bytes has another length inside")
+    return listed // 16
 
 
 def _is_our_own(content: FileBytes) -> bool:

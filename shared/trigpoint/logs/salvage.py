@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import ChunkIndex, Footer, MessageIndex
+from mcap.records import ChunkIndex, Footer
 
 from trigpoint.errors import LogDamaged
 from trigpoint.logs.channels import ChannelKey, PackedRows
 from trigpoint.logs.chunks import FRAME, ChunkMessage, messages, parsed
 from trigpoint.logs.file_bytes import FileBytes
 from trigpoint.logs.log_files import file_path
-from trigpoint.logs.mcap_scan import FOOTER_BYTES, MAGIC, UNKNOWN, Damage, McapScan
+from trigpoint.logs.mcap_scan import FOOTER_BYTES, INDEX_HEAD_BYTES, MAGIC, UNKNOWN, Damage, McapScan, index_count
 from trigpoint.logs.mcap_writer import McapFileWriter
 from trigpoint.logs.numbering import NumberedPiece, Piece, numbered
 
@@ -112,13 +112,10 @@ def _chunk_indexes(content: FileBytes) -> Iterator[ChunkIndex]:
 
 
 def _index_count(content: FileBytes, offset: int) -> int:
-    head = content.read(offset, offset + FRAME.size)
+    head = content.read(offset, offset + INDEX_HEAD_BYTES)
     if len(head) < FRAME.size or head[0] != Opcode.MESSAGE_INDEX:
         raise LogDamaged(f"no message index at {offset}")
-    length = FRAME.unpack(head)[1]
-    if offset + FRAME.size + length > content.size_bytes:
-        raise LogDamaged(f"message index of {length} bytes at {offset}")
-    return len(parsed(MessageIndex, content.read(offset + FRAME.size, offset + FRAME.size + length)).records)
+    return index_count(head, FRAME.size + FRAME.unpack_from(head)[1])
 
 
 def write_salvage(salvage: Salvage, folder: Path) -> tuple[Path, ...]:

@@ -1,7 +1,7 @@
 """Whether log files are as they were written, and what is in them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from trigpoint.errors import InputError, LogDamaged
@@ -15,6 +15,8 @@ from trigpoint.logs.findings import FileSummary, Finding, TopicSummary
 from trigpoint.logs.log_files import SUFFIX, file_numbers, file_path
 from trigpoint.logs.mcap_scan import UNKNOWN, McapScan
 from trigpoint.logs.seals import is_sealed, orphan_seals, seal_fault
+
+FINDINGS_LIMIT = 10_000  # of single messages, in all files looked at
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,12 +92,20 @@ class _Verifier:
         key = scan.channels.get(message.channel_id)
         if key is None:
             detail = f"message {message.mcap_sequence} of channel {message.channel_id}, which is not defined"
-            self.findings.append(Finding(scan.path, offset, "unknown channel", detail, 1))
+            self._found(Finding(scan.path, offset, "unknown channel", detail, 1))
             return
         tally.add(message.channel_id, message.log_time_ns)
         identity = key.identity(message.mcap_sequence)
         if identity.source and not self.seen.add(identity):
-            self.findings.append(Finding(scan.path, offset, "repeated identity", str(identity)))
+            self._found(Finding(scan.path, offset, "repeated identity", str(identity)))
+
+    def _found(self, finding: Finding) -> None:
+        """One message's finding: kept, up to a number of them."""
+        if len(self.findings) < FINDINGS_LIMIT:
+            self.findings.append(finding)
+        elif len(self.findings) == FINDINGS_LIMIT:
+            detail = f"{finding.detail}; no more than {FINDINGS_LIMIT} such findings are listed"
+            self.findings.append(replace(finding, detail=detail))
 
     def _damages(self, scan: McapScan) -> None:
         kind = "unfinished" if scan.torn_tail else "damaged"
