@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from landmark_maps.examples import change, checkpoint, landmark
 from trigpoint.errors import InputError
 from trigpoint.landmarks.geopackage_store import GeoPackageStore
 from trigpoint.landmarks.memory_store import MemoryStore
-from trigpoint.landmarks.model import Checkpoint, Landmark, LandmarkChanges
+from trigpoint.landmarks.model import Anchor, Checkpoint, Landmark, LandmarkChanges
 from trigpoint.landmarks.ports import LandmarkStore
 from trigpoint.landmarks.postgis_store import PostgisStore
 from trigpoint.landmarks.queries import DegreeBox, Disc, LandmarkQuery
@@ -263,3 +264,14 @@ def test_a_landmark_the_map_never_had_has_no_history(moved: LandmarkStore) -> No
 
 def test_an_empty_store_has_no_history(store: LandmarkStore) -> None:
     assert store.history("A") == ()
+
+
+def test_one_name_in_two_images_is_two_anchors(store: LandmarkStore) -> None:
+    whole = examples.whole_change()
+    (tied, *_) = whole.anchors
+    twins = (tied, replace(tied, image="tile-2", landmark=""))
+    store.apply(replace(whole, anchors=twins), checkpoint(1))
+    assert sorted((row.image, row.landmark) for row in store.rows() if isinstance(row, Anchor)) == [
+        ("tile-1", "L1"),
+        ("tile-2", ""),
+    ]

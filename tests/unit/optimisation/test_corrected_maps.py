@@ -8,12 +8,21 @@ import pytest
 from solved_worlds.examples import Lap, World, world
 from solved_worlds.logged import append_world
 from trigpoint.events.solved import SolvedMap
+from trigpoint.logs.as_of import log_as_of
 from trigpoint.logs.memory_log import MemoryLog
-from trigpoint.logs.readings import LABEL_STREAM, logged_maps
+from trigpoint.logs.readings import (
+    LABEL_STREAM,
+    logged_anchors,
+    logged_drives,
+    logged_frame,
+    logged_maps,
+    logged_verdicts,
+)
 from trigpoint_ingest.anchors import import_anchors
 from trigpoint_ingest.core.anchors import LabelledAnchors
 from trigpoint_ingest.corrections import Attribution, exclude_drives, include_drives, retract_anchor
 from trigpoint_optimisation.app import build
+from trigpoint_optimisation.core.solve import solve_map
 from trigpoint_optimisation.settings import OdometrySettings, SolveSettings
 
 SETTINGS = SolveSettings(method="anchored", odometry=OdometrySettings(keyframe_m=4.0))  # coarse: quick
@@ -82,3 +91,12 @@ def test_each_version_says_how_far_it_read_the_corrections(corrected: MemoryLog,
     labels = len(everything.anchors)
     read = [dict(one.head.inputs)[LABEL_STREAM] for one in logged_maps(corrected)]
     assert read == [labels, labels + 2, labels + 4]
+
+
+def test_a_version_is_solved_again_from_the_log_as_its_inputs_say(corrected: MemoryLog) -> None:
+    second = logged_maps(corrected)[1]
+    then = log_as_of(corrected, second)
+    again = solve_map(
+        logged_drives(then), logged_anchors(then), logged_frame(then), SETTINGS, verdicts=logged_verdicts(then)
+    )
+    assert_same_landmarks(second, again.map)
