@@ -105,7 +105,8 @@ class IngestService:
             self._begin(self._sealed())
 
     def _is_due(self, now_s: float) -> bool:
-        if self._journal.pending_count >= self._settings.batch_count:
+        journal, settings = self._journal, self._settings
+        if journal.pending_count >= settings.batch_count or journal.pending_bytes >= settings.batch_bytes:
             return True
         return now_s - self._sealed_s >= self._settings.batch_s and self._has_work()
 

@@ -30,6 +30,7 @@ REFUSED_STREAM = STREAM_PATTERNS[EventRefused]
 VEHICLE_STREAM = STREAM_PATTERNS[VehicleDescribed]
 FRAME_IDENTITY = EventIdentity("ingest", "map-frame", 0)
 SHORT_STRETCH = 16  # messages that are sooner looked at one by one than together
+LARGE_BYTES = 16 * 1024  # of payload that is not
 
 logger = logging.getLogger(__name__)
 
@@ -163,9 +164,15 @@ def _stretches(run: EncodedRun, plain: NDArray[np.bool_]) -> list[tuple[EncodedR
     edges = [0, *(np.flatnonzero(np.diff(plain)) + 1).tolist(), len(run)]
     cuts: list[tuple[int, int, bool]] = []
     for start, stop in pairwise(edges):
-        is_plain = bool(plain[start]) and (stop - start >= SHORT_STRETCH or len(edges) == 2)  # alone
+        is_plain = bool(plain[start]) and _is_worth_it(run, start, stop)
         if cuts and not is_plain and not cuts[-1][2]:
             cuts[-1] = (cuts[-1][0], stop, False)
         else:
             cuts.append((start, stop, is_plain))
     return [(run if stop - start == len(run) else run.part(start, stop), is_plain) for start, stop, is_plain in cuts]
+
+
+def _is_worth_it(run: EncodedRun, start: int, stop: int) -> bool:
+    """Whether plain messages [start, stop) are taken together: if there is nothing else, or enough of them."""
+    count = stop - start
+    return count == len(run) or count >= SHORT_STRETCH or sum(map(len, run.payloads[start:stop])) >= LARGE_BYTES

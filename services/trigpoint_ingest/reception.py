@@ -24,6 +24,8 @@ from trigpoint_ingest.journal import Journal
 from trigpoint_ingest.settings import IngestSettings
 
 TAKEN_AT_ONCE = 8192  # messages, before what is due is looked at
+CUT_OFF_S = 10.0  # a vehicle with something missing that is silent for so long has no link, and sends it again later
+TAKEN_AT_ONCE_BYTES = 8 * 1024 * 1024
 WRONG_SENDER = "wrong sender"
 TOO_LARGE = "too large"
 TOO_MANY_DRIVES, TOO_MANY_MESSAGES, TOO_MANY_NAMES = "too many drives", "too many messages", "too many names"
@@ -49,6 +51,7 @@ class Reception:
         self._arrived: dict[Drive, list[EncodedRun]] = {}
         self._orders: dict[Drive, RunOrder] = {}
         self._gap_since_s: dict[Drive, float] = {}
+        self._gap_heard_s: dict[Drive, float] = {}  # when a drive with a gap was last heard
         self._allowances: dict[str, MessageAllowance] = {}
         self._to_acknowledge: set[Drive] = set()
         self._told: set[tuple[str, str]] = set()
@@ -68,13 +71,15 @@ class Reception:
     def take(self, timeout_s: float) -> int:
         """How many messages came: all there are now, TAKEN_AT_ONCE or a few more at most; the first of each
         subscription may take until the timeout to come."""
-        taken = 0
+        taken = taken_bytes = 0
         for subscription in self._subscriptions:
             found = subscription.receive_run(timeout_s)
             while found is not None:
                 self._take(found)
                 taken += len(found.run)
-                found = subscription.receive_run(0.0) if taken < TAKEN_AT_ONCE else None
+                taken_bytes += sum(map(len, found.run.payloads))
+                has_room = taken < TAKEN_AT_ONCE and taken_bytes < TAKEN_AT_ONCE_BYTES
+                found = subscription.receive_run(0.0) if has_room else None
         for drive in list(self._arrived):
             self._order(drive, self._arrived.pop(drive))
         return taken
@@ -146,10 +151,18 @@ class Reception:
             self._count_lost(order.overflowed - overflowed)
         if order.awaited > awaited or not order.held:
             self._gap_since_s.pop(drive, None)
-        if order.held and drive not in self._gap_since_s:
-            self._gap_since_s[drive] = self._now_s()
-            self._instruments.sequence_gaps.labels(drive[0]).inc()
+            self._gap_heard_s.pop(drive, None)
+        if order.held:
+            self._note_gap(drive, self._now_s())
         self._to_acknowledge.add(drive)
+
+    def _note_gap(self, drive: Drive, now_s: float) -> None:
+        """The wait for what is missing goes on, or begins: also after a vehicle was cut off, as it can send it now."""
+        if drive not in self._gap_since_s:
+            self._instruments.sequence_gaps.labels(drive[0]).inc()
+        if drive not in self._gap_since_s or now_s - self._gap_heard_s[drive] > CUT_OFF_S:
+            self._gap_since_s[drive] = now_s
+        self._gap_heard_s[drive] = now_s
 
     def _hand_on(self, run: EncodedRun) -> None:
         limit = self._settings.message_limit_bytes
@@ -167,13 +180,14 @@ class Reception:
         """Gaps that are too old given up; what was lost is told of."""
         now_s = self._now_s()
         for drive, since_s in list(self._gap_since_s.items()):
-            if now_s - since_s >= self._settings.gap_timeout_s:
+            is_cut_off = now_s - self._gap_heard_s[drive] > CUT_OFF_S
+            if now_s - since_s >= self._settings.gap_timeout_s and not is_cut_off:
                 released = self._orders[drive].give_up()
                 count = 0 if released is None else len(released)
                 logger.error("drive %s: messages missing for %.0f s, going on with %d", drive, now_s - since_s, count)
                 if released is not None:
                     self._hand_on(released)
-                del self._gap_since_s[drive]
+                del self._gap_since_s[drive], self._gap_heard_s[drive]
         lost = sum(subscription.lost for subscription in self._subscriptions)
         if lost > self._lost:
             self._count_lost(lost - self._lost)

@@ -106,12 +106,14 @@ class PlainPayloads:
         found = np.zeros(len(payloads), dtype=np.bool_)
         if schema not in PLAIN_SCHEMAS:
             return found
-        lengths = np.fromiter(map(len, payloads), dtype=np.int64, count=len(payloads))
-        for length in np.unique(lengths).tolist():
-            rows = np.flatnonzero(lengths == length)
-            alike = payloads if len(rows) == len(payloads) else [payloads[row] for row in rows.tolist()]
-            table = np.frombuffer(b"".join(alike), dtype=np.uint8).reshape(len(rows), length)
-            found[rows] = self._plain_table(schema, table)
+        lengths = [len(payload) for payload in payloads]
+        of_length = set(lengths)
+        if len(of_length) == 1:
+            return self._plain_table(schema, _table(payloads))
+        by_row = np.array(lengths)
+        for length in of_length:
+            rows = np.flatnonzero(by_row == length)
+            found[rows] = self._plain_table(schema, _table([payloads[row] for row in rows.tolist()]))
         return found
 
     def _plain_table(self, schema: str, table: NDArray[np.uint8]) -> NDArray[np.bool_]:
@@ -146,6 +148,12 @@ class PlainPayloads:
         while self._kept_bytes > SHAPES_BYTES and len(self._judges) > 1:
             self._judges.popitem(last=False)
             self._kept_bytes = sum(size * len(judges) for (_, size), judges in self._judges.items())
+
+
+def _table(payloads: Sequence[bytes]) -> NDArray[np.uint8]:
+    """Payloads of one length as rows (n, L)."""
+    whole = payloads[0] if len(payloads) == 1 else b"".join(payloads)
+    return np.frombuffer(whole, dtype=np.uint8).reshape(len(payloads), -1)
 
 
 def _are_worth_a_shape(count: int, length: int) -> bool:
