@@ -141,12 +141,3 @@ def test_the_disaster_drill_ends_as_the_runbook_says(data: Path) -> None:
         left = [row.envelope.identity.sequence for row in log.read(f"veh-{VEHICLE}")]
     assert 0 < len(left) < EVENTS
     assert left == list(range(len(left)))  # a whole beginning: nothing in the middle is missing
-
-
-def test_the_drill_destroys_what_it_says_it_does(data: Path) -> None:
-    run_command("replay", "--data", data, "--restore")
-    lines = blocks("sh drill")
-    damaged = next(index for index, line in enumerate(lines) if "truncate" in line)
-    for line in lines[: damaged + 1]:
-        shell(line, data)
-    assert run_command("log", "verify", data).status == 2

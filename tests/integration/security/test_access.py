@@ -1,5 +1,7 @@
 """What a real router refuses over real TLS sessions, and how it tells of it."""
 
+import socket
+import ssl
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -112,6 +114,20 @@ def test_whoever_speaks_no_tls_gets_no_session(fleet: SecuredFleet) -> None:
     plain = fleet.fleet.endpoint.replace("tls/", "tcp/")
     with pytest.raises(ServiceError):
         ZenohBus(ZenohSettings(mode="client", connect=(plain,), connect_timeout_s=0.5))
+
+
+def test_whoever_shows_no_certificate_gets_no_session(fleet: SecuredFleet) -> None:
+    before = fleet.refused()
+    context = ssl.create_default_context(cafile=str(files_of(fleet.folder, "veh-a").authority_file))
+    host, _, port = fleet.fleet.endpoint.removeprefix("tls/").partition(":")
+    with (
+        socket.create_connection((host, int(port)), timeout=SOON_S) as plain,
+        pytest.raises(ssl.SSLError),
+        context.wrap_socket(plain, server_hostname=host) as protected,
+    ):
+        protected.recv(1)  # with TLS 1.3 the refusal comes after the handshake
+    assert comes_true(lambda: fleet.refused() > before)
+    assert comes_true(lambda: "peer sent no certificates" in fleet.router.err)
 
 
 def test_a_router_of_another_authority_is_not_trusted(fleet: SecuredFleet, tmp_path: Path) -> None:

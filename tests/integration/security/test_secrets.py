@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from command_runs.processes import trigpoint_process
+from command_runs.processes import trigpoint_process, wait_until
 from command_runs.running import trigpoint
 from secured_fleet.fleet import SecuredFleet, authority_of, secured_configuration
 
@@ -48,6 +48,19 @@ def test_a_service_with_a_password_and_a_key_shows_neither(fleet: SecuredFleet) 
         shown = "".join([*commands, *pages, router.err, ingest.err, router.out, ingest.out])
     secrets = (PASSWORD, IN_URL, key_text(fleet, "services"), key_text(fleet, "router"))
     assert [secret for secret in secrets if secret in shown] == []
+
+
+def test_a_database_that_does_not_answer_is_told_of_without_its_password(fleet: SecuredFleet) -> None:
+    config = fleet.fleet.config
+    with (
+        trigpoint_process(fleet.folder, "router", "--config", config),
+        trigpoint_process(fleet.folder, "serve", "landmarks", "--config", config) as landmarks,
+    ):
+        wait_until(lambda: "127.0.0.1" in landmarks.err and "WARNING" in landmarks.err, "a warning of the database")
+        command = Path(f"/proc/{landmarks.popen.pid}/cmdline").read_bytes().decode()
+        landmarks.stop()
+        shown = command + landmarks.err + landmarks.out
+    assert [secret for secret in (PASSWORD, IN_URL) if secret in shown] == []
 
 
 @pytest.mark.parametrize("words", [("config", "show"), ("config", "show", "--json"), ("config", "check")])
