@@ -9,9 +9,18 @@ import time
 from pathlib import Path
 
 from trigpoint.bus.zenoh_bus import ZenohSettings
-from trigpoint.events.observed import ImuMeasured, VehicleDescribed
+from trigpoint.events.observed import GnssFixReceived, ImuMeasured, Observed, VehicleDescribed, WheelSpeedMeasured
 from trigpoint_vehicle.publisher import VehiclePublisher
 from trigpoint_vehicle.settings import VehicleSettings
+
+
+def measured(number: int) -> Observed:
+    """The kinds in turns: each has a key of its own, and messages of one number behind the other go by several."""
+    if number % 10 == 0:
+        return GnssFixReceived(lat_deg=-33.9 + 1e-9 * number, lon_deg=151.2, height_m=20.0, sigma_m=3.0)
+    if number % 2:
+        return ImuMeasured(yaw_rate_radps=0.0, acceleration_x_mps2=1e-6 * number, acceleration_y_mps2=0.0)
+    return WheelSpeedMeasured(speed_mps=1e-6 * number, steering_rad=0.0, yaw_rate_radps=0.0)
 
 
 def main() -> None:
@@ -34,8 +43,7 @@ def main() -> None:
             os.write(taken, f"{identity.boot_id} {identity.sequence}\n".encode())
             count += 1
             stop.wait(max(began_s + count / options.rate_hz - time.monotonic(), 0.0))
-            event = ImuMeasured(yaw_rate_radps=0.0, acceleration_x_mps2=1e-6 * count, acceleration_y_mps2=0.0)
-            identity = publisher.send(event, stamp_ns=time.time_ns())
+            identity = publisher.send(measured(count), stamp_ns=time.time_ns())
         os.write(taken, f"{identity.boot_id} {identity.sequence}\n".encode())
         sys.exit(0 if publisher.flush(300.0) else 1)
 
