@@ -24,6 +24,17 @@ MAP_STREAM = STREAM_PATTERNS[MapSolved]
 Checkpoints = Mapping[str, Mapping[str, int]]  # by reader: by stream the next number it has to read
 
 
+@dataclass(frozen=True, slots=True)
+class Obstacle:
+    """From which number on a stream has to stay, and why."""
+
+    number: int
+    reason: str
+
+
+UNKNOWN = Obstacle(0, "it began while the log was looked at")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LogFile:
     """A file of a stream with the numbers [first_number, stop_number), times in [start_ns, end_ns]."""
@@ -60,30 +71,22 @@ class RetentionPlan:
 
 
 def planned_retention(
-    files: Mapping[str, Sequence[LogFile]], obstacles: Mapping[str, "Obstacle"], keeping: Keeping
+    files: Mapping[str, Sequence[LogFile]], obstacles: Mapping[str, Obstacle], keeping: Keeping
 ) -> RetentionPlan:
     """The files that may and should go, of each stream the oldest only, one behind the other.
 
-    `files` by stream in the order of their numbers; a stream without obstacle is free up to its end.
+    `files` by stream in the order of their numbers; a stream of which no obstacle is known stays.
     """
     total = sum(file.size_bytes for own in files.values() for file in own)
     may_go, reasons = [], {}
     for stream, own in files.items():
-        free, reasons[stream] = _free(own, obstacles[stream])
+        free, reasons[stream] = _free(own, obstacles.get(stream, UNKNOWN))
         may_go += free
     by_age = sorted(may_go, key=lambda file: (file.stream, file.first_number))
     gone = _too_old(by_age, keeping.newer_than_ns) if keeping.total_bytes is None else _too_many(by_age, total, keeping)
     stays = {stream: reasons[stream] for stream, own in files.items() if own and len(own) > _count(gone, stream)}
     kept = ((s, "it is young enough" if _count(gone, s) < _count(may_go, s) else why) for s, why in stays.items())
     return RetentionPlan(removed=tuple(gone), kept_because=tuple(kept), total_bytes=total)
-
-
-@dataclass(frozen=True, slots=True)
-class Obstacle:
-    """From which number on a stream has to stay, and why."""
-
-    number: int
-    reason: str
 
 
 def _free(files: Sequence[LogFile], obstacle: Obstacle) -> tuple[list[LogFile], str]:
