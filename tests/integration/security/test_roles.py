@@ -30,7 +30,7 @@ def fleet(tmp_path: Path) -> Iterator[SecuredFleet]:
             stack.enter_context(
                 trigpoint_process(fleet.folder, "serve", service, "--config", fleet.fleet.config, *flags)
             )
-        fleet.fleet.wait_ready("ingest", "filtering")
+        fleet.fleet.wait_ready(*SERVICES)
         yield fleet
 
 
