@@ -11,9 +11,11 @@ from figures import (
     demo,
     faults_link,
     faults_log,
+    faults_postgis,
     faults_services,
     mrclam,
     nclt,
+    projection,
     security,
     security_fuzz,
     victoria_park,
@@ -27,7 +29,8 @@ GROUPS: Mapping[str, Sequence[Figure]] = {
     "nclt": nclt.FIGURES,
     "campus": campus.FIGURES,
     "demo": demo.FIGURES,
-    "faults": (*faults_link.FIGURES, *faults_log.FIGURES, *faults_services.FIGURES),
+    "faults": (*faults_link.FIGURES, *faults_log.FIGURES, *faults_postgis.FIGURES, *faults_services.FIGURES),
+    "ingest": projection.FIGURES,
     "security": (*security.FIGURES, *security_fuzz.FIGURES),
 }
 PROGRAM = (str(Path(sys.executable).with_name("trigpoint")),)
