@@ -25,7 +25,7 @@ class BareWriter:
     def __init__(self, path: Path, count: int) -> None:
         self._file = path.open("wb")
         self._writer = Writer(self._file)
-        self._writer.start()  # type: ignore[no-untyped-call]
+        self._writer.start()
         self._channels: dict[tuple[str, bytes], int] = {}
         self._left = count
         self._began_s = 0.0

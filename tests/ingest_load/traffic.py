@@ -38,7 +38,13 @@ def sweep_of(size_bytes: int, die: random.Random) -> bytes:
 
 def drive_runs(vehicle: str, *, count: int, size_bytes: int, seed: int, together: int) -> Iterator[BusRun]:
     """A drive of `count` messages as its vehicle sends it: a description, then sweeps, `together` at a time."""
-    schema, payload = encode(VehicleDescribed(vehicle=vehicle, declared_crs="EPSG:32756", **ORIGIN))
+    described = VehicleDescribed(
+        vehicle=vehicle,
+        declared_crs="EPSG:32756",
+        declared_origin_easting_m=332_000.0,
+        declared_origin_northing_m=6_249_000.0,
+    )
+    schema, payload = encode(described)
     yield _bus_run(vehicle, VehicleDescribed, schema, 0, [payload])
     die = random.Random(seed)
     schema = encode(LandmarksDetected(detections=()))[0]
@@ -46,9 +52,6 @@ def drive_runs(vehicle: str, *, count: int, size_bytes: int, seed: int, together
     for first in range(1, count, together):
         payloads = [variety[(first + index) % len(variety)] for index in range(min(together, count - first))]
         yield _bus_run(vehicle, LandmarksDetected, schema, first, payloads)
-
-
-ORIGIN = {"declared_origin_easting_m": 332_000.0, "declared_origin_northing_m": 6_249_000.0}
 
 
 def _bus_run(vehicle: str, kind: type, schema: str, first: int, payloads: list[bytes]) -> BusRun:

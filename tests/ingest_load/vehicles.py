@@ -87,13 +87,12 @@ def send_all(fleet: Sequence[Vehicle], bus: ZenohBus, heard: Subscription) -> No
 def send_at_pace(fleet: Sequence[Vehicle], bus: ZenohBus, heard: Subscription, rate_hz: float) -> None:
     """Every drive sent at `rate_hz` runs a second in all, and acknowledged."""
     by_name = {vehicle.name: vehicle for vehicle in fleet}
-    began_s, count = time.monotonic(), 0
-    for vehicle in _turns(fleet):
+    began_s = time.monotonic()
+    for count, vehicle in enumerate(_turns(fleet)):
         while (left_s := began_s + count / rate_hz - time.monotonic()) > 0.0:
             _hear(by_name, heard, left_s)
         vehicle.send(bus)
         _hear(by_name, heard, 0.0)
-        count += 1
     while any(vehicle.acknowledged < vehicle.sent for vehicle in fleet):
         _hear(by_name, heard, 0.01)
 
