@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from trigpoint.observability.metrics import Instruments
 from trigpoint.observability.running import Service
 from trigpoint_cli.serving.resources import opened_resources
+from trigpoint_cli.serving.sealing import sealing
 from trigpoint_cli.settings import Settings
 from trigpoint_ingest.app import IngestService
 
@@ -13,5 +14,5 @@ from trigpoint_ingest.app import IngestService
 @contextmanager
 def opened(settings: Settings, instruments: Instruments) -> Iterator[Service]:
     """Ingest on the fleet's log and bus."""
-    with opened_resources(settings) as resources:
+    with opened_resources(settings) as resources, sealing(resources.log):
         yield IngestService(resources.log, resources.bus, settings.ingest, instruments=instruments)

@@ -73,7 +73,7 @@ def record_absences(folder: Path, added: Iterable[Absence]) -> None:
 
 def replace_durably(path: Path, content: bytes) -> None:
     """The file holds this, whole and on the disk, or what it held before. Raises OSError."""
-    partial = path.with_name(path.name + ".part")
+    partial = path.with_name(f"{path.name}.{os.getpid()}.part")  # another process may be at the same
     with partial.open("wb", buffering=0) as file:
         file.write(content)
         os.fsync(file.fileno())

@@ -165,9 +165,17 @@ def end_whole(path: Path) -> None:
 def _rewrite_end(path: Path, end: int, tail: bytes, index: FileIndex) -> None:
     with path.open("r+b", buffering=0) as file:
         os.ftruncate(file.fileno(), end)
-        os.pwrite(file.fileno(), tail, end)
+        _write_at(file.fileno(), tail, end)
         with FileBytes(path) as content:
             checksum = content.checksum(0, content.size_bytes)
         ending = index.ending(offset=end + len(tail), data_crc=checksum)
-        os.pwrite(file.fileno(), ending, end + len(tail))
+        _write_at(file.fileno(), ending, end + len(tail))
         os.fsync(file.fileno())
+
+
+def _write_at(descriptor: int, data: bytes, offset: int) -> None:
+    """All of the data written: where a disk fills up, it first takes less than it is given. Raises OSError."""
+    remaining = memoryview(data)
+    while remaining:
+        written = os.pwrite(descriptor, remaining, offset)
+        remaining, offset = remaining[written:], offset + written

@@ -237,6 +237,11 @@ class McapLog:
                     ended.append(stream)
         return tuple(ended)
 
+    def written_streams(self) -> tuple[str, ...]:
+        """The streams this log is the writer of, sorted."""
+        with self._lock:
+            return tuple(sorted(self._writers))
+
     def end_abandoned(self) -> tuple[str, ...]:
         """Every file ended that no writer has open, all streams then let go; the streams that are being written.
 
