@@ -80,7 +80,7 @@ class GroupCommit:
     def _append(self, stream: str, rows: Sequence[Row]) -> None:
         """The rows appended, without those that an append which failed had made durable nevertheless."""
         if stream not in self._following:
-            self._following[stream] = self._log.next_number(stream)
+            self._following[stream] = self._log.append(stream, ()).number + 1
         if stream in self._let_go:
             there = self._log.append(stream, ()).number + 1
             rows = rows_behind(rows, there - self._following[stream])
