@@ -93,13 +93,18 @@ class VehiclePublisher:
         self._link = Link(bus, reopen_after_s=self._settings.reopen_after_s)
         self._mutex = threading.Lock()
         self._drained = threading.Condition()
+        self._unsynced = threading.Event()
         self._wake = threading.Event()
         self._stop = threading.Event()
         self._channels: dict[tuple[str, str], SpoolChannel] = {}
         self._next_sequence = 0
         self._failure: Exception | None = None
-        self._thread = threading.Thread(target=self._run, name=f"publisher of {vehicle}", daemon=True)
-        self._thread.start()
+        self._threads = (
+            threading.Thread(target=self._run, args=(self._sync,), name=f"publisher's spool of {vehicle}", daemon=True),
+            threading.Thread(target=self._run, args=(self._turn,), name=f"publisher of {vehicle}", daemon=True),
+        )
+        for thread in self._threads:
+            thread.start()
 
     def describe(self, event: VehicleDescribed, *, stamp_ns: int) -> EventIdentity:
         """The identity of the description, the first event of a boot; raises as `send` does."""
@@ -154,8 +159,8 @@ class VehiclePublisher:
         return found
 
     def _wake_up(self) -> None:
-        if not self._wake.is_set():
-            self._wake.set()
+        if not self._unsynced.is_set():
+            self._unsynced.set()
 
     def _require(self, payload: bytes) -> None:
         if self._failure is not None:
@@ -197,33 +202,41 @@ class VehiclePublisher:
         if self._stop.is_set():
             return
         self._stop.set()
+        self._unsynced.set()
         self._wake.set()
-        self._thread.join(CLOSE_LONGEST_S)
+        for thread in self._threads:
+            thread.join(CLOSE_LONGEST_S)
         self._forwarder.leave()
         self._link.close()
         with self._mutex:
             self._spool.close()
 
-    def _run(self) -> None:
+    def _run(self, turn: Callable[[], None]) -> None:
         try:
             while not self._stop.is_set():
-                self._turn()
+                turn()
         except Exception as error:  # carried to whoever sends next, and raised there
             self._failure = error
             logger.error("publisher of %s failed: %s", self.vehicle, error)
             with self._drained:
                 self._drained.notify_all()
 
+    def _sync(self) -> None:
+        """One turn of the spool's thread: what is new becomes durable, whatever the bus is doing meanwhile."""
+        self._unsynced.wait()
+        self._unsynced.clear()
+        self._spool.sync()
+        self._wake.set()
+        self._stop.wait(self._settings.sync_interval_s)
+
     def _turn(self) -> None:
-        """One turn of the publisher's thread: what is new becomes durable, then some of it is sent."""
+        """One turn of the sending thread: what is durable is sent, and sent again."""
         if self._spool.is_drained:
             self._wake.wait(IDLE_S)
         self._wake.clear()
-        self._spool.sync()
-        synced_s = time.monotonic()
         try:
             self._require_bus()
-            while self._forwarder.step(0.0) and time.monotonic() - synced_s < self._settings.sync_interval_s:
+            while self._forwarder.step(0.0) and not self._stop.is_set():
                 pass
             self._forwarder.step(self._settings.sync_interval_s)
         except ServiceError as error:

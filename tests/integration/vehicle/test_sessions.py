@@ -1,5 +1,6 @@
 """A publisher with a session of its own opens it anew when nothing is acknowledged for long."""
 
+import threading
 from pathlib import Path
 
 from command_runs.processes import free_ports, wait_until
@@ -16,29 +17,35 @@ SOON_S = 60.0
 
 
 def test_a_silent_session_is_replaced_and_what_it_was_given_is_sent_again(tmp_path: Path) -> None:
-    with acknowledger() as endpoint, cuttable_link(int(endpoint.rpartition(":")[2])) as link:
-        with VehiclePublisher("veh-a", tmp_path, ZenohSettings(connect=(link.endpoint,)), IMPATIENT) as publisher:
-            publisher.describe(DESCRIBED, stamp_ns=1)
-            assert publisher.flush(SOON_S)
-            sessions = publisher.sent.sessions
-            link.cut(closing=False)
-            publisher.describe(DESCRIBED, stamp_ns=2)
-            wait_until(lambda: publisher.sent.sessions > sessions, "another session")
-            link.mend()
-            assert publisher.flush(SOON_S)
-            assert publisher.sent.acknowledged == 2
+    with (
+        acknowledger() as endpoint,
+        cuttable_link(int(endpoint.rpartition(":")[2])) as link,
+        VehiclePublisher("veh-a", tmp_path, ZenohSettings(connect=(link.endpoint,)), IMPATIENT) as publisher,
+    ):
+        publisher.describe(DESCRIBED, stamp_ns=1)
+        assert publisher.flush(SOON_S)
+        sessions = publisher.sent.sessions
+        link.cut(closing=False)
+        publisher.describe(DESCRIBED, stamp_ns=2)
+        wait_until(lambda: publisher.sent.sessions > sessions, "another session")
+        link.mend()
+        assert publisher.flush(SOON_S)
+        assert publisher.sent.acknowledged == 2
 
 
 def test_a_session_that_is_idle_for_long_stays(tmp_path: Path) -> None:
-    with acknowledger() as endpoint:
-        with VehiclePublisher("veh-a", tmp_path, ZenohSettings(connect=(endpoint,)), IMPATIENT) as publisher:
-            publisher.describe(DESCRIBED, stamp_ns=1)
-            assert publisher.flush(SOON_S)
-            sessions = publisher.sent.sessions
-            assert publisher.flush(1.0)
-            publisher.describe(DESCRIBED, stamp_ns=2)
-            assert publisher.flush(SOON_S)
-            assert publisher.sent.sessions == sessions
+    pause = threading.Event()
+    with (
+        acknowledger() as endpoint,
+        VehiclePublisher("veh-a", tmp_path, ZenohSettings(connect=(endpoint,)), IMPATIENT) as publisher,
+    ):
+        publisher.describe(DESCRIBED, stamp_ns=1)
+        assert publisher.flush(SOON_S)
+        sessions = publisher.sent.sessions
+        pause.wait(1.0)  # longer than a silent session is borne
+        publisher.describe(DESCRIBED, stamp_ns=2)
+        assert publisher.flush(SOON_S)
+        assert publisher.sent.sessions == sessions
 
 
 def test_a_client_without_its_router_spools_and_sends_once_it_is_there(tmp_path: Path) -> None:
