@@ -13,6 +13,7 @@ import pytest
 
 from command_runs.processes import CLEAN
 from command_runs.running import trigpoint as run_command
+from landmark_databases.cluster import Cluster
 from landmark_maps.examples import append_labels, append_mapped, label, pin_frame, solved_landmark, solved_map
 from trigpoint.bus.register import Role
 from trigpoint.configuration.sections import HttpSettings
@@ -141,3 +142,29 @@ def test_the_disaster_drill_ends_as_the_runbook_says(data: Path) -> None:
         left = [row.envelope.identity.sequence for row in log.read(f"veh-{VEHICLE}")]
     assert 0 < len(left) < EVENTS
     assert left == list(range(len(left)))  # a whole beginning: nothing in the middle is missing
+
+
+@pytest.mark.postgis
+def test_a_database_of_a_server_that_was_dropped_comes_back_from_the_log(data: Path, postgis: Cluster) -> None:
+    name = postgis.created()
+    chosen = ("--data", data, "--database", postgis.url(name), "--password-file", postgis.password_file)
+    first = run_command("replay", *chosen, "--restore", "--json")
+    before = run_command("landmarks", *chosen, "--json").answer
+    with postgis.connected("postgres") as connection:
+        connection.execute(f"DROP DATABASE {name} WITH (FORCE)")
+        connection.execute(f"CREATE DATABASE {name} TEMPLATE with_postgis")
+    again = run_command("replay", *chosen, "--restore", "--json")
+    assert [one.answer["restored_versions"] for one in (first, again)] == [[1, 2], [1, 2]]
+    assert [one.answer["differences"] for one in (first, again)] == [0, 0]
+    assert without_duration(run_command("landmarks", *chosen, "--json").answer) == without_duration(before)
+
+
+def test_restoring_a_database_that_lacks_nothing_changes_nothing(data: Path) -> None:
+    assert run_command("replay", "--data", data, "--restore", "--json").answer["restored_versions"] == [1, 2]
+    again = run_command("replay", "--data", data, "--restore", "--json").answer
+    assert (again["restored_versions"], again["differences"]) == ([], 0)
+
+
+def test_without_restoring_a_database_that_is_gone_stays_so(data: Path) -> None:
+    assert run_command("replay", "--data", data).status == 2
+    assert not (data / "landmarks.gpkg").exists()
