@@ -6,7 +6,7 @@ import click
 
 from trigpoint_cli.corrections import attributed, attribution_options, correction_answer
 from trigpoint_cli.data_dir import DataDirectory, data_option
-from trigpoint_cli.output import Answer, JsonObject, Screen, answering
+from trigpoint_cli.output import Answer, JsonObject, Screen, answering, counted
 from trigpoint_ingest.anchor_files import read_anchor_file
 from trigpoint_ingest.anchors import AnchorImportReport, import_anchors
 from trigpoint_ingest.core.standing import AnchorStanding
@@ -64,7 +64,7 @@ def retract(
     """
     with data.opened_log() as log:
         report = retract_anchor(log, anchor, image=image, by=attributed(author, reason))
-    return correction_answer(report, "anchors", past="retracted")
+    return correction_answer(report, "anchor", past="retracted")
 
 
 @command.command("list")
@@ -76,7 +76,7 @@ def list_anchors(data: DataDirectory, *, screen: Screen) -> Answer:
         standings = logged_anchor_standings(log)
     in_force = sum(one.retracted is None for one in standings)
     values = {"anchors": {"count": len(standings), "in_force": in_force, "items": list(map(_item, standings))}}
-    return Answer(values, (*map(_line, standings), f"{len(standings)} anchors, {in_force} of them in force"))
+    return Answer(values, (*map(_line, standings), f"{counted(len(standings), 'anchor')}, {in_force} of them in force"))
 
 
 def _item(one: AnchorStanding) -> JsonObject:

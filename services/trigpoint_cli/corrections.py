@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from trigpoint_cli.output import Answer
+from trigpoint_cli.output import Answer, counted
 from trigpoint_ingest.anchors import CORRECTIONS_STREAM
 from trigpoint_ingest.corrections import Attribution, CorrectionReport
 from trigpoint_ingest.settings import operating_user
@@ -26,14 +26,14 @@ def attributed(author: str | None, reason: str) -> Attribution:
 
 
 def correction_answer(report: CorrectionReport, what: str, *, past: str) -> Answer:
-    """What came of a correction of so many of `what`, as "drives" "excluded"."""
+    """What came of a correction of so many of `what`, as "drive" "excluded"."""
     values = {
         past: [asdict(event) for event in report.appended],
         "unchanged": report.known,
         "stream": CORRECTIONS_STREAM,
         "first_number": report.first_number if report.appended else None,
     }
-    line = f"{len(report.appended)} {what} {past}"
+    line = f"{counted(len(report.appended), what)} {past}"
     if report.known:
         line += f", {report.known} already {'were' if report.known > 1 else 'was'}"
     return Answer(values, (line,))

@@ -4,7 +4,7 @@ import click
 
 from trigpoint_cli.corrections import attributed, attribution_options, correction_answer
 from trigpoint_cli.data_dir import DataDirectory, data_option
-from trigpoint_cli.output import Answer, JsonObject, Screen, answering, utc
+from trigpoint_cli.output import Answer, JsonObject, Screen, answering, counted, utc
 from trigpoint_ingest.core.standing import DriveStanding
 from trigpoint_ingest.corrections import exclude_drives, include_drives, logged_drive_standings
 
@@ -25,7 +25,7 @@ def list_drives(data: DataDirectory, *, screen: Screen) -> Answer:
         standings = logged_drive_standings(log)
     excluded = sum(one.excluded for one in standings)
     values = {"drives": {"count": len(standings), "excluded": excluded, "items": list(map(_item, standings))}}
-    return Answer(values, (*map(_line, standings), f"{len(standings)} drives, {excluded} of them excluded"))
+    return Answer(values, (*map(_line, standings), f"{counted(len(standings), 'drive')}, {excluded} of them excluded"))
 
 
 @command.command("exclude")
@@ -40,7 +40,7 @@ def exclude(
     """Leave VEHICLE's drives out: the next map version is as if they had never been."""
     with data.opened_log() as log:
         report = exclude_drives(log, vehicle, boot_id=boot_id, by=attributed(author, reason))
-    return correction_answer(report, "drives", past="excluded")
+    return correction_answer(report, "drive", past="excluded")
 
 
 @command.command("include")
@@ -55,7 +55,7 @@ def include(
     """Let VEHICLE's excluded drives take part again."""
     with data.opened_log() as log:
         report = include_drives(log, vehicle, boot_id=boot_id, by=attributed(author, reason))
-    return correction_answer(report, "drives", past="included")
+    return correction_answer(report, "drive", past="included")
 
 
 def _item(one: DriveStanding) -> JsonObject:

@@ -6,7 +6,7 @@ import click
 
 from trigpoint_cli.data_dir import DataDirectory, as_of_option, data_option
 from trigpoint_cli.database import database_options
-from trigpoint_cli.output import Answer, JsonObject, Screen, answering, metres, utc
+from trigpoint_cli.output import Answer, JsonObject, Screen, answering, counted, metres, utc
 from trigpoint_evaluation.core.explanation import Explanation, LoggedCorrection, Move, Sighting, TiedAnchor
 from trigpoint_evaluation.explaining import explained
 
@@ -99,13 +99,15 @@ def _lines(found: Explanation) -> tuple[str, ...]:
     missing = f", {found.missing} more are in the log no longer" if found.missing else ""
     return (
         head,
-        f"seen in {len(found.sightings)} sweeps{missing}:",
+        f"seen in {counted(len(found.sightings), 'sweep')}{missing}:",
         *_some(list(map(_sighting_line, found.sightings))),
-        f"tied to {len(found.anchors)} anchors:" if found.anchors else "tied to no anchor",
+        f"tied to {counted(len(found.anchors), 'anchor')}:" if found.anchors else "tied to no anchor",
         *map(_anchor_line, found.anchors),
-        f"{len(found.corrections)} corrections behind it:" if found.corrections else "no corrections behind it",
+        f"{counted(len(found.corrections), 'correction')} behind it:"
+        if found.corrections
+        else "no corrections behind it",
         *map(_correction_line, found.corrections),
-        f"changed in {len(found.moves)} map versions:",
+        f"changed in {counted(len(found.moves), 'map version')}:",
         *_some(list(map(_move_line, found.moves))),
     )
 
@@ -146,5 +148,5 @@ def _move_line(one: Move) -> str:
     moved = "new" if one.moved_m is None else f"moved {metres(one.moved_m)}"
     return (
         f"  versions {one.map_version} to {until}: {moved}, sigma {metres(one.sigma_major_m)}, "
-        f"{one.observation_count} detections, {len(one.anchors)} anchors"
+        f"{counted(one.observation_count, 'detection')}, {counted(len(one.anchors), 'anchor')}"
     )

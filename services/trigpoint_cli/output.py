@@ -144,6 +144,11 @@ def utc(stamp_ns: int) -> str:
     return datetime.fromtimestamp(stamp_ns / NS_PER_S, tz=UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
+def counted(count: int, what: str) -> str:
+    """So many of something whose plural ends in s."""
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
 def metres(value: float) -> str:
     """A length as people read it."""
     return "unknown" if not math.isfinite(value) else f"{value:.3g} m" if value < 100.0 else f"{value:.0f} m"
