@@ -25,6 +25,7 @@ IMU = ImuMeasured(yaw_rate_radps=0.1, acceleration_x_mps2=0.0, acceleration_y_mp
 DESCRIBED = VehicleDescribed(vehicle="veh-a", wheelbase_m=2.8)
 QUICK = VehicleSettings(ack_timeout_s=0.05, ack_timeout_max_s=0.1)
 SOON_S = 20.0  # what takes milliseconds here
+ONCE = replace(QUICK, ack_timeout_s=SOON_S, ack_timeout_max_s=SOON_S)  # nothing is sent again for lack of time
 
 
 class Receiver:
@@ -132,7 +133,7 @@ def test_a_restart_sends_the_old_boot_s_rest_first_then_its_own(opened: Opening,
     first.close()
     while not receiver.hears_nothing():
         pass
-    second = opened(replace(QUICK, ack_timeout_s=SOON_S, ack_timeout_max_s=SOON_S))
+    second = opened(ONCE)
     second.describe(DESCRIBED, stamp_ns=7)
     heard = receiver.heard(3)
     assert [message.identity.boot_id for message in heard] == [first.boot_id, first.boot_id, second.boot_id]
@@ -141,7 +142,7 @@ def test_a_restart_sends_the_old_boot_s_rest_first_then_its_own(opened: Opening,
 
 
 def test_messages_wait_for_somebody_to_listen(opened: Opening, exchange: MemoryExchange) -> None:
-    publisher = opened(replace(QUICK, ack_timeout_s=SOON_S, ack_timeout_max_s=SOON_S))
+    publisher = opened(ONCE)
     publisher.describe(DESCRIBED, stamp_ns=5)
     assert not publisher.flush(0.2)
     with MemoryBus(exchange) as bus:
@@ -152,7 +153,7 @@ def test_messages_wait_for_somebody_to_listen(opened: Opening, exchange: MemoryE
 
 
 def test_at_most_a_window_is_under_way(opened: Opening, receiver: Receiver) -> None:
-    window = replace(QUICK, window_count=5, ack_timeout_s=SOON_S, ack_timeout_max_s=SOON_S)
+    window = replace(ONCE, window_count=5)
     publisher = opened(window)
     publisher.describe(DESCRIBED, stamp_ns=5)
     last = [publisher.send(IMU, stamp_ns=6) for _ in range(9)][-1]
@@ -228,7 +229,7 @@ def test_a_refused_event_uses_up_no_number(opened: Opening) -> None:
 
 
 def test_a_full_spool_refuses_and_goes_on_once_something_is_acknowledged(opened: Opening, receiver: Receiver) -> None:
-    publisher = opened(replace(QUICK, segment_bytes=1024, spool_limit_bytes=8192))
+    publisher = opened(replace(ONCE, segment_bytes=1024, spool_limit_bytes=8192))
     publisher.describe(DESCRIBED, stamp_ns=5)
     with pytest.raises(AppendFailed, match="limit 8192"):
         fill(publisher)
