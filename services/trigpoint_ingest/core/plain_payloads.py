@@ -153,7 +153,7 @@ class PlainPayloads:
 def _table(payloads: Sequence[bytes]) -> NDArray[np.uint8]:
     """Payloads of one length as rows (n, L)."""
     whole = payloads[0] if len(payloads) == 1 else b"".join(payloads)
-    return np.frombuffer(whole, dtype=np.uint8).reshape(len(payloads), -1)
+    return np.frombuffer(whole, dtype=np.uint8).reshape(len(payloads), len(payloads[0]))
 
 
 def _are_worth_a_shape(count: int, length: int) -> bool:
