@@ -278,13 +278,31 @@ def test_a_gap_is_given_up_after_a_while_and_what_waited_goes_in(rows: Rows) -> 
 
 
 def test_old_messages_sent_again_do_not_prolong_the_wait_for_a_missing_one(rows: Rows) -> None:
-    clock = iter(range(1000))  # a second from one look to the next
+    now_s = [0.0]
     bus, log = MemoryBus(), MemoryLog()
-    service = IngestService(log, bus, replace(SETTINGS, gap_timeout_s=30.0), now_s=lambda: float(next(clock)))
+    service = IngestService(log, bus, replace(SETTINGS, gap_timeout_s=30.0), now_s=lambda: now_s[0])
     send([*rows[:5], *rows[6:10]], bus)
     drain(service)
-    send_again(rows[:5], bus, service, times=20)
+    for now_s[0] in (8.0, 16.0, 24.0, 32.0):
+        send(rows[:5], bus)
+        drain(service)
     assert stored(log) == [*rows[:5], *rows[6:10]]
+    bus.close()
+
+
+def test_a_gap_of_a_vehicle_that_is_cut_off_waits_for_its_link(rows: Rows) -> None:
+    now_s = [0.0]
+    bus, log = MemoryBus(), MemoryLog()
+    service = IngestService(log, bus, replace(SETTINGS, gap_timeout_s=30.0), now_s=lambda: now_s[0])
+    send([*rows[:5], *rows[6:10]], bus)
+    drain(service)
+    now_s[0] = 100.0  # not heard for longer than any gap may last
+    drain(service)
+    send(rows[10:12], bus)  # the link is back, and what is missing comes last
+    drain(service)
+    send(rows[5:6], bus)
+    drain(service)
+    assert stored(log) == rows[:12]
     bus.close()
 
 
