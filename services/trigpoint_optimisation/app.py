@@ -65,22 +65,24 @@ def build(log: EventLog, settings: SolveSettings, *, progress: Progress = in_sil
     head = replace(solution.map.head, inputs=inputs, wall_s=time.monotonic() - begun_s)
     numbered = tuple(replace(event, map_version=version) for event in (*events[:-1], head))
     log.append(
-        STREAM, _envelopes(numbered, boot_id=_boot_id(version, inputs, settings), stamp_ns=_last_seen_ns(solution))
+        STREAM, envelopes(numbered, boot_id=boot_id_of(version, inputs, settings), stamp_ns=last_seen_ns(solution))
     )
     return solution
 
 
-def _last_seen_ns(solution: Solution) -> int:
+def last_seen_ns(solution: Solution) -> int:
     """The newest measurement in the map: a version's stamp, so that no clock is in the log."""
     return max((int(path.stamp_ns[-1]) for path in solution.map.trajectories), default=0)
 
 
-def _boot_id(version: int, inputs: tuple[tuple[str, int], ...], settings: SolveSettings) -> str:
+def boot_id_of(version: int, inputs: tuple[tuple[str, int], ...], settings: SolveSettings) -> str:
+    """The boot under which the events of a version are numbered."""
     text = f"{version}/{inputs}/{settings_json(settings)}"
     return blake2b(text.encode(), digest_size=8).hexdigest()
 
 
-def _envelopes(events: tuple[Mapped, ...], *, boot_id: str, stamp_ns: int) -> list[Envelope[Event]]:
+def envelopes(events: tuple[Mapped, ...], *, boot_id: str, stamp_ns: int) -> list[Envelope[Event]]:
+    """The events of a version, numbered."""
     return [
         Envelope(EventIdentity(SOURCE, boot_id, sequence), stamp_ns, event) for sequence, event in enumerate(events)
     ]

@@ -156,6 +156,19 @@ class AnchorSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class LiveSettings:
+    """How the service keeps up with the vehicles, and when it solves the whole map anew."""
+
+    version_interval_s: float = 0.5  # between two versions of the map, if anything changed
+    moved_share: float = 0.1  # of its sigma: a landmark that moved by less is not told of
+    settle_s: float = 10.0  # after so long without news the whole map is solved
+    solve_interval_s: float = 120.0  # between two whole solves that only doubt asks for
+    correction_delay_s: float = 1.0  # labels come in crowds: the last one is waited for
+    pose_limit: int = 20_000  # in the growing graph: beyond, the whole map is solved and the graph begins anew
+    solver_niceness: int = 10  # of the process that solves the whole map: updates go first
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SolveSettings:
     """One solve of the map."""
 
@@ -166,6 +179,7 @@ class SolveSettings:
     odometry: OdometrySettings = field(default_factory=OdometrySettings)
     detections: DetectionSettings = field(default_factory=DetectionSettings)
     anchors: AnchorSettings = field(default_factory=AnchorSettings)
+    live: LiveSettings = field(default_factory=LiveSettings)
 
     @property
     def fixes(self) -> FixSettings:
@@ -179,5 +193,7 @@ class SolveSettings:
 
 
 def settings_json(settings: SolveSettings) -> str:
-    """The settings as one line of JSON with sorted keys: a map version can be solved again from it."""
-    return json.dumps(asdict(settings), sort_keys=True, separators=(",", ":"))
+    """The settings of the solve itself as one line of JSON with sorted keys: a map version can be solved again from
+    it."""
+    chosen = {name: value for name, value in asdict(settings).items() if name != "live"}
+    return json.dumps(chosen, sort_keys=True, separators=(",", ":"))

@@ -27,7 +27,7 @@ class _OpenTracks:
         return _OpenTracks(self.number[chosen], self.position_m[chosen], self.count[chosen], self.last_ns[chosen])
 
 
-def _mutual_pairs(a_m: Floats, b_m: Floats, gate_m: float) -> tuple[Ints, Ints]:
+def mutual_pairs(a_m: Floats, b_m: Floats, gate_m: float) -> tuple[Ints, Ints]:
     """Indices (k,), (k,) of points that are each other's nearest and within the gate."""
     if not len(a_m) or not len(b_m):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
@@ -55,7 +55,7 @@ def linked_tracks(stamp_ns: Ints, point_m: Floats, usable: NDArray[np.bool_], *,
             continue
         now_ns = stamp_ns[sweep[0]]
         tracks = tracks.keep(tracks.last_ns >= now_ns - round(settings.track_gap_s * 1e9))
-        i, j = _mutual_pairs(point_m[sweep], tracks.position_m, settings.track_gate_m)
+        i, j = mutual_pairs(point_m[sweep], tracks.position_m, settings.track_gate_m)
         tracks.count[j] += 1
         share = np.maximum(1.0 / tracks.count[j], 0.1)[:, None]
         tracks.position_m[j] += share * (point_m[sweep[i]] - tracks.position_m[j])

@@ -11,7 +11,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def _composed(T_a_b: Floats, T_b_c: Floats) -> Floats:
+def composed(T_a_b: Floats, T_b_c: Floats) -> Floats:
     """Poses (n, 3) T_a_c."""
     return np.column_stack([transform_points(T_a_b, T_b_c[:, :2]), T_a_b[:, 2] + T_b_c[:, 2]])
 
@@ -24,8 +24,8 @@ def poses_at(prepared: PreparedDrive, pose: Floats, stamp_ns: Ints) -> Floats:
     before = np.clip(np.searchsorted(keyframe_ns, stamp_ns, side="right") - 1, 0, len(keyframe_ns) - 1)
     after = np.minimum(before + 1, len(keyframe_ns) - 1)
     here, start, end = path.at(stamp_ns), path.at(keyframe_ns[before]), path.at(keyframe_ns[after])
-    from_before = _composed(pose[before], relative_poses(start, here))
-    from_after = _composed(pose[after], relative_poses(end, here))
+    from_before = composed(pose[before], relative_poses(start, here))
+    from_after = composed(pose[after], relative_poses(end, here))
     span_ns = np.maximum(keyframe_ns[after] - keyframe_ns[before], 1)
     by_time = np.clip((stamp_ns - keyframe_ns[before]) / span_ns, 0.0, 1.0)
     moved = np.hypot(*(here - start)[:, :2].T) + np.hypot(*(end - here)[:, :2].T)

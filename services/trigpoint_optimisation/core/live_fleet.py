@@ -1,0 +1,168 @@
+"""The drives that are under way and the map they grow: a fold over their events, begun anew from each whole solve."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trigpoint.events.envelope import Envelope
+from trigpoint.events.estimated import FixJudged
+from trigpoint.events.mapped import LandmarkSolved, OdometryCorrected, TrajectorySolved
+from trigpoint.events.observed import Observed, VehicleDescribed
+from trigpoint.geodesy.poses import wrap_angle_rad
+from trigpoint.geodesy.projection import MapFrame
+from trigpoint_optimisation.core.live_drive import Leg, LiveDrive
+from trigpoint_optimisation.core.live_map import WAITING_M, LiveMap
+from trigpoint_optimisation.core.live_placing import Placed, map_from_odom
+from trigpoint_optimisation.core.live_state import DriveName, DrivePlace
+from trigpoint_optimisation.core.trajectory import composed
+from trigpoint_optimisation.settings import SolveSettings
+
+Floats = NDArray[np.float64]
+
+LOOSENED = 4.0  # of a start's covariance: what it shares with the landmarks is not to be counted twice
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Start:
+    """Where a drive was at a stamp: T_map_base (3,), or T_map_odom (3,) where that is known; covariance (3, 3)."""
+
+    stamp_ns: int
+    T_map_base: Floats | None = None
+    T_map_odom: Floats | None = None
+    covariance: Floats
+
+
+def corrected_start(stamp_ns: int, event: OdometryCorrected) -> Start:
+    """A start from the newest correction that was sent."""
+    return Start(stamp_ns=stamp_ns, T_map_odom=event.T_map_odom, covariance=event.covariance)
+
+
+def solved_start(path: TrajectorySolved) -> Start:
+    """A start from the end of a solved path."""
+    return Start(stamp_ns=int(path.stamp_ns[-1]), T_map_base=path.pose[-1], covariance=path.covariance[-1])
+
+
+@dataclass(slots=True)
+class _Followed:
+    """One drive: what makes its legs, those that may be needed again, the fixes the filter accepted, its start."""
+
+    drive: LiveDrive
+    legs: list[Leg] = field(default_factory=list)
+    accepted: set[int] = field(default_factory=set)
+    start: Start | None = None
+
+
+class LiveFleet:
+    """Drives and map; `starts` are the places of drives that were under way before."""
+
+    def __init__(
+        self,
+        frame: MapFrame,
+        settings: SolveSettings,
+        *,
+        base: Sequence[LandmarkSolved] = (),
+        starts: Mapping[DriveName, Start] | None = None,
+        excluded: Iterable[DriveName] = (),
+    ) -> None:
+        self._frame, self._settings = frame, settings
+        self._followed: dict[DriveName, _Followed] = {}
+        self._starts = dict(starts or {})
+        self.excluded = frozenset(excluded)
+        self.map = LiveMap(frame, settings, base=base)
+
+    def take(self, row: Envelope[Observed]) -> list[DrivePlace]:
+        """Where the drive is now, if the event brought it to a new keyframe and it has a place."""
+        name = (row.identity.source, row.identity.boot_id)
+        followed = self._followed.get(name) or self._begun(name, row.event)
+        places = []
+        for leg in followed.drive.take(row):
+            followed.legs.append(leg)
+            places += self._lead(name, followed, leg)
+        return places
+
+    def judged(self, verdict: FixJudged) -> None:
+        """The filter's verdict on a fix; only accepted ones hold."""
+        name = (verdict.vehicle, verdict.boot_id)
+        if not verdict.accepted:
+            return
+        followed = self._followed.get(name)
+        if followed is not None:
+            followed.accepted.add(verdict.fix_sequence)
+            self.map.judged(name, verdict.fix_sequence)
+
+    def begin_anew(
+        self,
+        landmarks: Sequence[LandmarkSolved],
+        trajectories: Sequence[TrajectorySolved],
+        *,
+        excluded: Iterable[DriveName],
+    ) -> list[DrivePlace]:
+        """The map begun anew from a whole solve, with what came since; where the drives are now."""
+        self.map = LiveMap(self._frame, self._settings, base=landmarks)
+        self.excluded = frozenset(excluded)
+        starts = {(path.vehicle, path.boot_id): solved_start(path) for path in trajectories if len(path.stamp_ns)}
+        newest: dict[DriveName, DrivePlace] = {}
+        for name, followed in self._followed.items():
+            followed.start = starts.get(name)
+            followed.legs = _still_needed(followed.legs, followed.start)
+            for leg in followed.legs:
+                for track in leg.tracks:
+                    track.used = 0
+            for leg in followed.legs:
+                for place in self._lead(name, followed, leg):
+                    newest[name] = place
+        return list(newest.values())
+
+    def _begun(self, name: DriveName, event: Observed) -> _Followed:
+        described = event if isinstance(event, VehicleDescribed) else VehicleDescribed(vehicle=name[0])
+        drive = LiveDrive(described, name[1], self._settings, point_scale=self._frame.point_scale)
+        followed = self._followed[name] = _Followed(drive, start=self._starts.pop(name, None))
+        return followed
+
+    def _lead(self, name: DriveName, followed: _Followed, leg: Leg) -> list[DrivePlace]:
+        """One leg into the map; legs before the drive's start are in the map's base already."""
+        if name in self.excluded:
+            return []
+        described = followed.drive.described
+        if followed.start is not None:
+            if leg.end_ns < followed.start.stamp_ns:
+                return []
+            self.map.begin(described, name[1], placed=_placed(followed.start, leg))
+            followed.start = None
+            return []
+        if not self.map.knows(name):
+            self.map.begin(described, name[1])
+        places = self.map.take({name: leg})
+        for fix in leg.fixes:
+            if fix.sequence in followed.accepted:
+                self.map.judged(name, fix.sequence)
+        return places
+
+
+def _still_needed(legs: Sequence[Leg], start: Start | None) -> list[Leg]:
+    """The legs that end after a start, and those a drive without one finds its place by."""
+    if not legs:
+        return []
+    recent = [leg for leg in legs if leg.path_m > legs[-1].path_m - WAITING_M]
+    if start is None:
+        return recent
+    return [leg for leg in legs if leg.end_ns >= start.stamp_ns] or recent[-1:]
+
+
+def _placed(start: Start, leg: Leg) -> Placed:
+    """The keyframe at the end of the first leg that reaches a start's stamp."""
+    T_map_odom = start.T_map_odom
+    if T_map_odom is None:
+        assert start.T_map_base is not None, "one of the two is known"
+        T_map_odom = map_from_odom(start.T_map_base, _odom_at(leg, start.stamp_ns))
+    pose = composed(T_map_odom[None, :], leg.T_odom_end[None, :])[0]
+    pose[2] = wrap_angle_rad(float(pose[2]))
+    return Placed(keyframe=leg.keyframe + 1, pose=pose, covariance=LOOSENED * start.covariance + 1e-9 * np.eye(3))
+
+
+def _odom_at(leg: Leg, stamp_ns: int) -> Floats:
+    share = float(np.clip((stamp_ns - leg.start_ns) / max(leg.end_ns - leg.start_ns, 1), 0.0, 1.0))
+    between: Floats = leg.T_odom_start + share * (leg.T_odom_end - leg.T_odom_start)
+    return between

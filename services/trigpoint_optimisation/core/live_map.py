@@ -1,0 +1,357 @@
+"""The map as it stands between two whole solves: it takes drives leg by leg and gives landmarks and places."""
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trigpoint.events.mapped import LandmarkSolved
+from trigpoint.events.observed import VehicleDescribed
+from trigpoint.geodesy.poses import transform_points
+from trigpoint.geodesy.projection import MapFrame, map_points_from_wgs84
+from trigpoint_optimisation.core.constellation import Constellation
+from trigpoint_optimisation.core.graph import MIN_RANGE_M
+from trigpoint_optimisation.core.incremental import IncrementalGraph
+from trigpoint_optimisation.core.live_association import Candidate, answer, candidate, chi_square
+from trigpoint_optimisation.core.live_drive import HungFix, Leg
+from trigpoint_optimisation.core.live_landmarks import LiveLandmark, detected_name, landmark_of, unused_name
+from trigpoint_optimisation.core.live_placing import (
+    LocalFix,
+    Placed,
+    map_from_odom,
+    placed_by_fixes,
+)
+from trigpoint_optimisation.core.live_state import DriveInMap, DriveName, DrivePlace, into_frame
+from trigpoint_optimisation.core.live_tracks import Track, mean_seen, seen_at, usable
+from trigpoint_optimisation.core.merging import joint_shift_pairs
+from trigpoint_optimisation.settings import HONEST_EDGES, SolveSettings
+
+Floats = NDArray[np.float64]
+
+WAITING_M = 400.0  # of path that a drive without a place keeps: older things are not seen again
+OPEN_M = 150.0  # of path after which a track that nothing decided is let go
+VOTED_EVERY_M = 10.0  # of path
+REACH_M = 12.0  # around where a track lies, within which landmarks may be its own
+CANDIDATES_MOST = 4  # of them, the nearest: the marginals of many are what an update takes longest for
+RETRIED_EVERY = 5  # keyframes: a track that nothing decides
+FOLLOWED_SIGMA_M = 0.15  # between a vehicle and a landmark it has in sight
+DISAGREEMENT = 25.0  # chi-square of a sighting that is not of its landmark
+STRIKES = 3  # such sightings in a row, and the track is no more of it
+FIX_SPACING_NS = 2_000_000_000  # between fixes in the graph
+FIX_KNOT_NS = 30_000_000_000  # the slow error of fixes is held for so long,
+FIX_DECAY = float(np.exp(-30.0 / HONEST_EDGES.bias_time_s))  # and decays from one to the next by this
+FIX_SIGMA_M = 3.0  # of a fix, slow and white part together, where a drive is placed by them
+NIS_KEPT, NIS_ENOUGH = 300, 100
+NIS_LIMIT = 2.0 * 2.0  # mean of chi-square, 2 degrees of freedom, twice
+CONFLICTS_LIMIT = 10  # tracks that had to leave their landmark
+
+
+class LiveMap:
+    """A map that grows by legs; `base` are the landmarks of the version it starts from."""
+
+    def __init__(self, frame: MapFrame, settings: SolveSettings, *, base: Sequence[LandmarkSolved] = ()) -> None:
+        self.landmarks = [landmark_of(event) for event in base]
+        self._frame, self._settings = frame, settings
+        self._graph = IncrementalGraph()
+        covariance = np.array([event.covariance_m2 for event in base]).reshape(-1, 2, 2)
+        self._point_m = np.array([event.position_m for event in base]).reshape(-1, 2)
+        self._graph.add_solved_landmarks(self._point_m, covariance)
+        self._graph.update()
+        self._drives: dict[DriveName, DriveInMap] = {}
+        self._touched: set[int] = set()
+        self._nis: deque[float] = deque(maxlen=NIS_KEPT)
+        self._fix_nis: deque[float] = deque(maxlen=NIS_KEPT)
+        self._conflicts = 0
+
+    @property
+    def pose_count(self) -> int:
+        """How many keyframes are in the graph."""
+        return self._graph.pose_count
+
+    @property
+    def doubt(self) -> str:
+        """Why the map should be solved as a whole, empty where nothing contradicts it."""
+        for what, nis in (("sightings", self._nis), ("fixes", self._fix_nis)):
+            if len(nis) >= NIS_ENOUGH and float(np.mean(nis)) > NIS_LIMIT:
+                return f"{what} are off by a mean chi-square of {np.mean(nis):.1f}: {NIS_LIMIT:g} is the limit"
+        if self._conflicts >= CONFLICTS_LIMIT:
+            return f"{self._conflicts} tracks had to leave their landmark: {CONFLICTS_LIMIT} is the limit"
+        return ""
+
+    def begin(self, described: VehicleDescribed, boot_id: str, *, placed: Placed | None = None) -> None:
+        """A drive from here on, at a place known from before if there is one."""
+        drive = DriveInMap(index=len(self._drives), described=described, boot_id=boot_id)
+        self._drives[described.vehicle, boot_id] = drive
+        if placed is not None:
+            self._start(drive, placed)
+
+    def knows(self, name: DriveName) -> bool:
+        """Whether the drive has begun."""
+        return name in self._drives
+
+    def judged(self, name: DriveName, fix_sequence: int) -> None:
+        """The filter accepted a fix: from now on it holds."""
+        drive = self._drives.get(name)
+        if drive is not None and fix_sequence in drive.hung:
+            self._take_fix(drive, *drive.hung.pop(fix_sequence))
+
+    def take(self, legs: Mapping[DriveName, Leg]) -> list[DrivePlace]:
+        """One leg of each of these drives; where they are now, those that have a place."""
+        for name, leg in legs.items():
+            drive = self._drives[name]
+            self._extend(drive, leg)
+            if drive.placed:
+                self._look(drive, leg, leg.tracks)
+            self._graph.update()
+        return [self.place(name) for name in legs if self._drives[name].placed]
+
+    def place(self, name: DriveName) -> DrivePlace:
+        """Where a placed drive is."""
+        drive = self._drives[name]
+        leg = drive.newest
+        assert leg is not None, "a placed drive has a leg"
+        T_map_base = self._graph.pose(drive.index, leg.keyframe + 1)
+        return DrivePlace(
+            vehicle=name[0],
+            boot_id=name[1],
+            stamp_ns=leg.end_ns,
+            T_map_base=T_map_base,
+            T_map_odom=map_from_odom(T_map_base, leg.T_odom_end),
+            covariance=self._graph.pose_covariance(drive.index, leg.keyframe + 1),
+        )
+
+    def changed_landmarks(self, *, share: float) -> list[LandmarkSolved]:
+        """The landmarks that are new or moved by more than `share` of their sigma since they were told of last; from
+        now on they are told of."""
+        found = []
+        self._refresh()
+        for number, landmark in enumerate(self.landmarks):
+            said, point = landmark.said, self._point_m[number]
+            if said is not None:
+                moved_m = np.hypot(*(point - said.position_m))
+                sigma_m = np.sqrt(0.5 * np.trace(said.covariance_m2))
+                if moved_m <= share * sigma_m and not (number in self._touched and self._is_surer(number, said)):
+                    continue
+            landmark.said = landmark.solved(point.copy(), self._graph.landmark_covariance(number))
+            found.append(landmark.said)
+        self._touched.clear()
+        return found
+
+    def _is_surer(self, number: int, said: LandmarkSolved) -> bool:
+        """Whether a landmark seen again is known clearly better than was said."""
+        return float(np.trace(self._graph.landmark_covariance(number))) < 0.7 * float(np.trace(said.covariance_m2))
+
+    def _refresh(self) -> None:
+        self._point_m = np.array([self._graph.point(n) for n in range(len(self.landmarks))]).reshape(-1, 2)
+
+    def _extend(self, drive: DriveInMap, leg: Leg) -> None:
+        for fix in leg.fixes:
+            drive.hung[fix.sequence] = leg.keyframe, fix
+        if drive.placed:
+            drive.newest = leg
+            self._graph.add_motion(drive.index, leg.keyframe, leg.delta, leg.covariance)
+            return
+        drive.waiting.append(leg)
+        drive.waiting = [each for each in drive.waiting if each.path_m > leg.path_m - WAITING_M]
+        drive.pending |= {track.number: track for track in leg.tracks}
+        oldest = drive.waiting[0].keyframe
+        drive.pending = {n: track for n, track in drive.pending.items() if track.last_keyframe >= oldest}
+        placed = self._place_of(drive)
+        if placed is not None:
+            self._start(drive, placed)
+
+    def _place_of(self, drive: DriveInMap) -> Placed | None:
+        fixes = [fix for fix in drive.fixes.values() if fix.keyframe >= drive.waiting[0].keyframe]
+        placed = placed_by_fixes(drive.waiting, fixes, sigma_m=FIX_SIGMA_M)
+        if placed is not None or fixes:
+            return placed
+        least = self._settings.detections.min_detections
+        tracks = [track for track in drive.pending.values() if track.count >= least]
+        return drive.placing.take(drive.waiting, tracks, self._known())
+
+    def _known(self) -> Constellation:
+        return Constellation(point_m=self._point_m, kind=tuple(landmark.kind for landmark in self.landmarks))
+
+    def _start(self, drive: DriveInMap, placed: Placed) -> None:
+        """The drive in the graph from a keyframe on, with what waited since."""
+        drive.placed, drive.first_keyframe = True, placed.keyframe
+        self._graph.add_start(drive.index, placed.keyframe, placed.pose, placed.covariance)
+        legs = [leg for leg in drive.waiting if leg.keyframe >= placed.keyframe]
+        drive.waiting = []
+        for leg in legs:
+            drive.newest = leg
+            self._graph.add_motion(drive.index, leg.keyframe, leg.delta, leg.covariance)
+        for fix in [fix for fix in drive.fixes.values() if fix.keyframe >= placed.keyframe]:
+            self._add_fix(drive, fix, legs[fix.keyframe - placed.keyframe].start_ns)
+        drive.fixes.clear()
+        self._graph.update()
+        waited, drive.pending = drive.pending, {}
+        for leg in legs[:-1]:
+            self._look(drive, leg, [waited[track.number] for track in leg.tracks if track.number in waited])
+            self._graph.update()
+
+    def _take_fix(self, drive: DriveInMap, keyframe: int, fix: HungFix) -> None:
+        fix_m = map_points_from_wgs84(np.array([fix.lat_deg]), np.array([fix.lon_deg]), self._frame)[0]
+        if not np.isfinite(fix_m).all():
+            return
+        arm = self._frame.point_scale * np.array([drive.described.antenna_x_m, drive.described.antenna_y_m])
+        local = LocalFix(keyframe=keyframe, fix_m=fix_m, antenna_m=transform_points(fix.T_keyframe_base, arm))
+        if not drive.placed:
+            drive.fixes[fix.sequence] = local
+        elif keyframe >= drive.first_keyframe and drive.newest is not None and keyframe <= drive.newest.keyframe:
+            self._add_fix(drive, local, fix.stamp_ns)
+
+    def _add_fix(self, drive: DriveInMap, fix: LocalFix, stamp_ns: int) -> None:
+        if fix.keyframe <= drive.last_fix_keyframe or stamp_ns < drive.last_fix_ns + FIX_SPACING_NS:
+            return
+        drive.last_fix_keyframe, drive.last_fix_ns = fix.keyframe, stamp_ns
+        if drive.knot < 0 or stamp_ns >= drive.knot_ns + FIX_KNOT_NS:
+            drive.knot, drive.knot_ns = drive.knot + 1, stamp_ns
+            sigma_m = HONEST_EDGES.bias_sigma_m
+            self._graph.add_fix_error(drive.index, drive.knot, sigma_m=sigma_m, decay=FIX_DECAY)
+        self._graph.add_fix(
+            drive.index,
+            fix.keyframe,
+            drive.knot,
+            fix.fix_m,
+            antenna_m=fix.antenna_m,
+            fixes=HONEST_EDGES,
+        )
+
+    def _look(self, drive: DriveInMap, leg: Leg, tracks: Sequence[Track]) -> None:
+        """What was seen from a keyframe goes into the graph, as far as it is known what it is."""
+        known = [track for track in tracks if track.number in drive.of]
+        self._check(drive, leg, known)
+        for track in known:
+            if track.number in drive.of:
+                self._sight(drive, leg, track)
+        least = self._settings.detections.min_detections
+        fresh = [
+            track for track in tracks if track.number not in drive.of and (track.count >= least or track.signature)
+        ]
+        self._associate(drive, leg, fresh)
+        self._vote(drive, leg)
+
+    def _check(self, drive: DriveInMap, leg: Leg, known: Sequence[Track]) -> None:
+        """Tracks whose sightings contradict their landmark again and again leave it; single ones are left out."""
+        seen = {track.number: found for track in known if (found := seen_at(track, leg.keyframe)) is not None}
+        if not seen:
+            return
+        pose = self._graph.pose(drive.index, leg.keyframe)
+        for track in [track for track in known if track.number in seen]:
+            point_m, noise = seen[track.number]
+            expected = into_frame(pose, self._graph.point(drive.of[track.number]))
+            off = chi_square(point_m - expected, noise + FOLLOWED_SIGMA_M**2 * np.eye(2))
+            self._nis.append(min(off, DISAGREEMENT))
+            if off <= DISAGREEMENT:
+                drive.strikes.pop(track.number, None)
+                continue
+            track.used += len(track.fresh(leg.keyframe))
+            drive.strikes[track.number] = drive.strikes.get(track.number, 0) + 1
+            if drive.strikes[track.number] >= STRIKES:
+                del drive.of[track.number], drive.strikes[track.number]
+                self._conflicts += 1
+
+    def _sight(self, drive: DriveInMap, leg: Leg, track: Track) -> None:
+        """Everything seen of a track up to a keyframe becomes sightings of its landmark, one a keyframe."""
+        number, fresh, taken = drive.of[track.number], track.fresh(leg.keyframe), []
+        track.used += len(fresh)
+        for keyframe in sorted({each.keyframe for each in fresh if each.keyframe >= drive.first_keyframe}):
+            seen = [each for each in fresh if each.keyframe == keyframe]
+            point_m, covariance = mean_seen(seen)
+            if np.hypot(*point_m) <= MIN_RANGE_M:
+                continue
+            taken += seen
+            noise = covariance + self._settings.detections.common_sigma_m**2 * np.eye(2)
+            self._graph.add_sighting(drive.index, keyframe, number, point_m, noise)
+        if taken:
+            vehicle = drive.described.vehicle
+            self.landmarks[number].take(track, taken, vehicle=vehicle, boot_id=drive.boot_id)
+            self._touched.add(number)
+
+    def _associate(self, drive: DriveInMap, leg: Leg, fresh: Sequence[Track]) -> None:
+        by_number = {track.number: track for track in fresh}
+        fresh = [track for track in fresh if track.number not in drive.pending or not leg.keyframe % RETRIED_EVERY]
+        fresh = [track for track in fresh if usable(track, drive.first_keyframe, leg.keyframe)]
+        found = answer({track.number: self._candidates(drive, leg.keyframe, track) for track in fresh})
+        for number, landmark in found.of.items():
+            self._settle(drive, leg, by_number[number], landmark)
+        for number in found.new:
+            self._settle(drive, leg, by_number[number], self._new_landmark(drive, leg, by_number[number]))
+        for number in found.open:
+            drive.pending.setdefault(number, by_number[number])
+            drive.pending_since_m.setdefault(number, leg.path_m)
+
+    def _settle(self, drive: DriveInMap, leg: Leg, track: Track, landmark: int) -> None:
+        drive.of[track.number] = landmark
+        drive.pending.pop(track.number, None)
+        drive.pending_since_m.pop(track.number, None)
+        self._sight(drive, leg, track)
+
+    def _candidates(self, drive: DriveInMap, keyframe: int, track: Track) -> list[Candidate]:
+        """The landmarks that a track may be of, from the keyframe it was seen from last."""
+        seen = usable(track, drive.first_keyframe, keyframe)
+        at = seen[-1].keyframe
+        point_m, noise = mean_seen([each for each in seen if each.keyframe == at])
+        if track.signature:
+            named = [n for n, one in enumerate(self.landmarks) if one.signature == track.signature]
+            return [Candidate(landmark=n, chi_square=0.0, distance_m=0.0, sigma_m=0.0) for n in named]
+        in_map = transform_points(self._graph.pose(drive.index, at), point_m)
+        taken = {drive.of[other] for other in track.apart if other in drive.of}
+        near = np.nonzero(np.hypot(*(self._point_m - in_map).T) <= REACH_M)[0]
+        kind = track.kind
+        near = near[np.argsort(np.hypot(*(self._point_m[near] - in_map).T), kind="stable")]
+        possible = [int(n) for n in near if n not in taken and self.landmarks[n].kind == kind][:CANDIDATES_MOST]
+        if not possible:
+            return []
+        expected, covariance = self._graph.seen_from(drive.index, at, possible)
+        return [
+            candidate(n, point_m, expected[row], noise=noise, expectation=covariance[row])
+            for row, n in enumerate(possible)
+        ]
+
+    def _new_landmark(self, drive: DriveInMap, leg: Leg, track: Track) -> int:
+        sequence, row = track.first
+        name = detected_name(drive.described.vehicle, drive.boot_id, sequence=sequence, row=row)
+        name = track.signature or unused_name(name, (landmark.name for landmark in self.landmarks))
+        last = usable(track, drive.first_keyframe, leg.keyframe)[-1]
+        point_m = transform_points(self._graph.pose(drive.index, last.keyframe), last.point_m)
+        self.landmarks.append(LiveLandmark(name=name, kind=track.kind, signature=track.signature))
+        self._point_m = np.vstack([self._point_m, point_m])
+        self._graph.add_landmark(len(self.landmarks) - 1, point_m)
+        return len(self.landmarks) - 1
+
+    def _vote(self, drive: DriveInMap, leg: Leg) -> None:
+        """Tracks that one landmark alone could not decide, decided by one joint shift of them all, or let go."""
+        for number in [n for n, since in drive.pending_since_m.items() if leg.path_m > since + OPEN_M]:
+            drive.pending.pop(number, None)
+            del drive.pending_since_m[number]
+        detections = self._settings.detections
+        if len(drive.pending) < detections.min_votes or leg.path_m < drive.voted_m + VOTED_EVERY_M:
+            return
+        drive.voted_m = leg.path_m
+        self._refresh()
+        tracks = [each for each in drive.pending.values() if usable(each, drive.first_keyframe, leg.keyframe)]
+        taken = set(drive.of.values())
+        free = np.array([n for n in range(len(self.landmarks)) if n not in taken], dtype=np.int64)
+        if len(tracks) < detections.min_votes or not len(free):
+            return
+        at = np.array([self._in_map(drive, leg, track) for track in tracks])
+        near = free[np.hypot(*(self._point_m[free] - at.mean(axis=0)).T) < OPEN_M]
+        if len(near) < detections.min_votes:
+            return
+        for a, b in joint_shift_pairs(at, self._point_m[near], settings=detections):
+            landmark = int(near[b])
+            if self.landmarks[landmark].kind == tracks[a].kind:
+                self._settle(drive, leg, tracks[a], landmark)
+
+    def _in_map(self, drive: DriveInMap, leg: Leg, track: Track) -> Floats:
+        point: Floats = np.mean(
+            [
+                transform_points(self._graph.pose(drive.index, each.keyframe), each.point_m)
+                for each in usable(track, drive.first_keyframe, leg.keyframe)
+            ],
+            axis=0,
+        )
+        return point

@@ -1,0 +1,154 @@
+"""Detections of the same thing in one pass, linked as the sweeps come."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trigpoint_optimisation.core.tracklets import mutual_pairs
+from trigpoint_optimisation.settings import DetectionSettings
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+LEAST_SHARE = 0.1  # of a new detection in a track's mean: the frame they are linked in drifts
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sweep:
+    """What one sweep saw. point_odom_m (d, 2), the same in the frame of the keyframe it hangs on, point_m (d, 2) with
+    covariance (d, 2, 2); kind and signature (d,), and `row` (d,): which detections of the event these are."""
+
+    stamp_ns: int
+    sequence: int
+    keyframe: int
+    row: tuple[int, ...]
+    point_odom_m: Floats
+    point_m: Floats
+    covariance: Floats
+    kind: tuple[str, ...]
+    signature: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Seen:
+    """One detection of a track: its keyframe, its sweep, the point (2,) in that keyframe's frame, its covariance
+    (2, 2)."""
+
+    keyframe: int
+    sequence: int
+    point_m: Floats
+    covariance: Floats
+
+
+@dataclass(slots=True)
+class Track:
+    """One thing that a pass sees: where in the drive's own frame (2,), and all its detections in order of keyframe, of
+    which the map has `used` the first. `first` is the sequence and row of the first detection; `apart` are tracks
+    that a sweep saw beside it."""
+
+    number: int
+    first: tuple[int, int]
+    first_ns: int
+    last_ns: int
+    position_odom_m: Floats
+    signature: str
+    count: int = 1
+    last_keyframe: int = 0
+    kinds: Counter[str] = field(default_factory=Counter)
+    seen: list[Seen] = field(default_factory=list)
+    used: int = 0
+    apart: set[int] = field(default_factory=set)
+
+    @property
+    def kind(self) -> str:
+        """What it was most often taken for; of several the first in the alphabet."""
+        return min(self.kinds, key=lambda kind: (-self.kinds[kind], kind))
+
+    def take(self, sweep: Sweep, row: int) -> None:
+        """One more detection."""
+        self.last_ns, self.last_keyframe = sweep.stamp_ns, sweep.keyframe
+        self.kinds[sweep.kind[row]] += 1
+        self.seen.append(
+            Seen(
+                keyframe=sweep.keyframe,
+                sequence=sweep.sequence,
+                point_m=sweep.point_m[row],
+                covariance=sweep.covariance[row],
+            )
+        )
+
+    def fresh(self, keyframe: int) -> list[Seen]:
+        """The detections up to a keyframe that the map has not used yet."""
+        return [each for each in self.seen[self.used :] if each.keyframe <= keyframe]
+
+
+class OpenTracks:
+    """The tracks that a sweep may still extend: by signature where detections carry one, else mutually nearest."""
+
+    def __init__(self, settings: DetectionSettings) -> None:
+        self._settings = settings
+        self._open: list[Track] = []
+        self._made = 0
+
+    def take(self, sweep: Sweep) -> list[Track]:
+        """The tracks that the sweep saw, old and new, in order of number."""
+        gap_ns = round(self._settings.track_gap_s * 1e9)
+        self._open = [track for track in self._open if track.last_ns >= sweep.stamp_ns - gap_ns]
+        rows = [row for row, name in enumerate(sweep.signature) if not name]
+        found = self._nearest(sweep, rows) | self._named(sweep)
+        for row in range(len(sweep.signature)):
+            found.setdefault(row, None)
+        seen = [self._taken(sweep, row, track) for row, track in sorted(found.items())]
+        numbers = {track.number for track in seen}
+        for track in seen:
+            track.apart |= numbers - {track.number}
+        return sorted(seen, key=lambda track: track.number)
+
+    def _nearest(self, sweep: Sweep, rows: list[int]) -> dict[int, Track | None]:
+        nameless = [track for track in self._open if not track.signature]
+        position = np.array([track.position_odom_m for track in nameless]).reshape(-1, 2)
+        i, j = mutual_pairs(sweep.point_odom_m[rows], position, self._settings.track_gate_m)
+        return {rows[int(a)]: nameless[int(b)] for a, b in zip(i, j, strict=True)}
+
+    def _named(self, sweep: Sweep) -> dict[int, Track | None]:
+        by_name: dict[str, Track] = {track.signature: track for track in self._open if track.signature}
+        return {row: by_name.get(name) for row, name in enumerate(sweep.signature) if name}
+
+    def _taken(self, sweep: Sweep, row: int, track: Track | None) -> Track:
+        point = sweep.point_odom_m[row]
+        if track is None:
+            track = Track(
+                number=self._made,
+                first=(sweep.sequence, sweep.row[row]),
+                first_ns=sweep.stamp_ns,
+                last_ns=sweep.stamp_ns,
+                position_odom_m=point.copy(),
+                signature=sweep.signature[row],
+            )
+            self._made += 1
+            self._open.append(track)
+        else:
+            track.count += 1
+            track.position_odom_m += max(1.0 / track.count, LEAST_SHARE) * (point - track.position_odom_m)
+        track.take(sweep, row)
+        return track
+
+
+def usable(track: Track, first_keyframe: int, keyframe: int) -> list[Seen]:
+    """What was seen of a track between two keyframes and is not used yet."""
+    return [each for each in track.fresh(keyframe) if each.keyframe >= first_keyframe]
+
+
+def mean_seen(seen: Sequence[Seen]) -> tuple[Floats, Floats]:
+    """The mean (2,) of detections from one keyframe, with its covariance (2, 2)."""
+    point_m: Floats = np.mean([each.point_m for each in seen], axis=0)
+    return point_m, np.sum([each.covariance for each in seen], axis=0) / len(seen) ** 2
+
+
+def seen_at(track: Track, keyframe: int) -> tuple[Floats, Floats] | None:
+    """Where a track was seen from a keyframe, with covariance, averaged; None where it was not, or is used already."""
+    seen = [each for each in track.fresh(keyframe) if each.keyframe == keyframe]
+    return mean_seen(seen) if seen else None

@@ -1,0 +1,287 @@
+"""Optimisation at work on a log that grows: keyframe by keyframe, and the whole map anew when that is called for."""
+
+import logging
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from hashlib import blake2b
+from typing import cast
+
+from trigpoint.bus.event_messages import event_message
+from trigpoint.bus.ports import Bus, Subscription
+from trigpoint.events.codec import Event
+from trigpoint.events.corrected import (
+    AnchorLabelled,
+    AnchorRetracted,
+    DriveExcluded,
+    DriveIncluded,
+    excluded_drives,
+)
+from trigpoint.events.envelope import Envelope, EventIdentity
+from trigpoint.events.estimated import FixJudged
+from trigpoint.events.keys import DEFAULT_MAP, DEFAULT_ROOT, KEY_VERSION, STREAM_PATTERNS, key_of
+from trigpoint.events.mapped import LandmarkSolved, Mapped, MapSolved, OdometryCorrected, TrajectorySolved
+from trigpoint.events.observed import Observed
+from trigpoint.geodesy.projection import MapFrame
+from trigpoint.logs.following import StreamFollower
+from trigpoint.logs.ports import EventLog
+from trigpoint.logs.readings import LABEL_STREAM, VEHICLE_PREFIX, VERDICT_STREAM, logged_corrections, pinned_frame
+from trigpoint.observability.metrics import Instruments
+from trigpoint_optimisation.app import SOURCE, STREAM, boot_id_of, envelopes, input_positions
+from trigpoint_optimisation.core.live_fleet import LiveFleet
+from trigpoint_optimisation.core.live_state import DriveName, DrivePlace
+from trigpoint_optimisation.resuming import Resumed, resumed
+from trigpoint_optimisation.settings import SolveSettings, settings_json
+from trigpoint_optimisation.whole_solve import WholeSolve, WholeSolver
+
+BATCH = 1000  # events taken at a time
+IDLE_S = 0.02  # between two looks at a log without news
+METHOD = "incremental"
+ODOMETRY_STREAM = STREAM_PATTERNS[OdometryCorrected]
+CORRECTIONS = (AnchorLabelled, AnchorRetracted, DriveExcluded, DriveIncluded)
+
+logger = logging.getLogger(__name__)
+
+
+class LiveOptimisation:
+    """Follows the log, appends corrections and map versions, then publishes them. Close it.
+
+    Messages on the bus only wake it up. What it appended is where it goes on after a restart. `names` are the root of
+    the keys and the map's name.
+    """
+
+    def __init__(
+        self,
+        log: EventLog,
+        solver: WholeSolver,
+        bus: Bus | None = None,
+        *,
+        settings: SolveSettings | None = None,
+        names: tuple[str, str] = (DEFAULT_ROOT, DEFAULT_MAP),
+        instruments: Instruments | None = None,
+    ) -> None:
+        self._log, self._solver, self._bus = log, solver, bus
+        self._root, self._map_name = names
+        self._settings = settings or SolveSettings()
+        self._instruments = instruments or Instruments("optimisation")
+        self._subscription: Subscription | None = None
+        if bus is not None:
+            self._subscription = bus.subscribe(f"{self._root}/{KEY_VERSION}/veh/*/obs/**")
+        self._fleet: LiveFleet | None = None
+        self._ready = False
+
+    @property
+    def ready(self) -> bool:
+        """Whether everything in the log when it began is taken in."""
+        return self._ready
+
+    def run(self, stop: threading.Event) -> None:
+        """Works until told to stop. Raises AppendFailed, LogDamaged, ServiceError where the solving process died."""
+        while not stop.is_set():
+            if not self.step():
+                self._wait(stop)
+
+    def close(self) -> None:
+        """Nothing more is heard or solved; again: no effect."""
+        self._ready = False
+        self._solver.close()
+        if self._subscription is not None:
+            self._subscription.close()
+
+    def step(self) -> bool:
+        """Whether there was something to take in; what is due is appended, and published."""
+        if self._fleet is None and not self._begin():
+            self._ready = True  # nothing can be placed before a frame is pinned
+            return False
+        taken = self._take()
+        self._ready = self._ready or not taken
+        self._solve()
+        self._tell()
+        return taken
+
+    def _wait(self, stop: threading.Event) -> None:
+        if self._subscription is None:
+            stop.wait(IDLE_S)
+            return
+        self._subscription.receive(IDLE_S)
+        while self._subscription.receive(0.0) is not None:
+            pass
+
+    def _begin(self) -> bool:
+        frame = pinned_frame(self._log)
+        if frame is None:
+            return False
+        state = resumed(self._log)
+        self._frame: MapFrame = frame
+        self._excluded = excluded_drives(logged_corrections(self._log))
+        self._fleet = LiveFleet(
+            frame, self._settings, base=state.landmarks, starts=state.starts, excluded=self._excluded
+        )
+        self._measured = StreamFollower(self._log, _is_vehicle, checkpoint=state.vehicle_numbers)
+        self._judged = StreamFollower(
+            self._log, [VERDICT_STREAM], checkpoint={VERDICT_STREAM: state.verdict_number}, kinds=(FixJudged,)
+        )
+        self._corrected = StreamFollower(
+            self._log, [LABEL_STREAM], checkpoint={LABEL_STREAM: self._log.next_number(LABEL_STREAM)}
+        )
+        self._go_on_from(state)
+        logger.info("going on", extra={"map_version": state.version, "landmarks": len(state.landmarks)})
+        return True
+
+    def _go_on_from(self, state: Resumed) -> None:
+        self._version, self._anchor_count = state.version, state.anchor_count
+        self._solved_inputs, self._tried_inputs = state.whole_inputs, state.whole_inputs
+        self._said_ns = dict(state.said_ns)
+        self._boots: dict[DriveName, tuple[str, int]] = {}
+        self._newest_ns = state.stamp_ns
+        self._told_s = self._solved_s = self._news_s = time.monotonic()
+        known = dict(state.whole_inputs).get(LABEL_STREAM, 0)
+        self._correction_s = self._news_s if self._log.next_number(LABEL_STREAM) > known else None
+
+    def _take(self) -> bool:
+        """Whether anything was new; corrections of odometry are appended."""
+        assert self._fleet is not None, "begun before"
+        rows = self._measured.take(BATCH)
+        places: dict[DriveName, DrivePlace] = {}
+        began_s = time.perf_counter()
+        for row in rows:
+            envelope = cast(Envelope[Observed], row.envelope)
+            self._newest_ns = max(self._newest_ns, envelope.stamp_ns)
+            for place in self._fleet.take(envelope):
+                places[place.vehicle, place.boot_id] = place
+                self._instruments.update_seconds.observe(time.perf_counter() - began_s)
+                began_s = time.perf_counter()
+        verdicts = self._judged.take(BATCH)
+        for row in verdicts:
+            self._fleet.judged(cast(FixJudged, row.envelope.event))
+        self._correct(list(places.values()))
+        if self._corrected.take(BATCH):
+            self._correction_s = time.monotonic()
+        if rows or verdicts:
+            self._news_s = time.monotonic()
+        self._instruments.projection_lag_events.set(self._measured.lag if len(rows) == BATCH else 0)
+        return bool(rows or verdicts)
+
+    def _correct(self, places: Sequence[DrivePlace]) -> None:
+        rows: list[Envelope[Event]] = []
+        for place in places:
+            name = (place.vehicle, place.boot_id)
+            if place.stamp_ns <= self._said_ns.get(name, -1):
+                continue
+            self._said_ns[name] = place.stamp_ns
+            boot_id, sequence = self._boots.get(name) or (_run_id(place), 0)
+            self._boots[name] = boot_id, sequence + 1
+            event = OdometryCorrected(
+                vehicle=place.vehicle,
+                boot_id=place.boot_id,
+                map_version=self._version,
+                T_map_odom=place.T_map_odom,
+                covariance=place.covariance,
+            )
+            rows.append(Envelope(EventIdentity(SOURCE, boot_id, sequence), place.stamp_ns, event))
+        self._say(ODOMETRY_STREAM, rows)
+
+    def _tell(self) -> None:
+        """The landmarks that changed as the next version, once it is time."""
+        now_s = time.monotonic()
+        if self._fleet is None or now_s < self._told_s + self._settings.live.version_interval_s:
+            return
+        self._told_s = now_s
+        changed = self._fleet.map.changed_landmarks(share=self._settings.live.moved_share)
+        if changed:
+            head = MapSolved(
+                map_version=0,
+                method=METHOD,
+                settings_json=settings_json(self._settings),
+                inputs=self._positions(),
+                landmark_count=len(self._fleet.map.landmarks),
+                anchor_count=self._anchor_count,
+                wall_s=time.monotonic() - now_s,
+                base_version=self._version,
+            )
+            self._append_version((*changed, head), stamp_ns=self._newest_ns)
+
+    def _positions(self) -> tuple[tuple[str, int], ...]:
+        """How far each stream is taken in."""
+        at = {**self._measured.checkpoint, **self._judged.checkpoint, **self._corrected.checkpoint}
+        return tuple((stream, at.get(stream, number)) for stream, number in input_positions(self._log))
+
+    def _append_version(self, events: Sequence[Mapped], *, stamp_ns: int) -> None:
+        version = self._version + 1
+        numbered = tuple(replace(event, map_version=version) for event in events)
+        head = cast(MapSolved, numbered[-1])
+        boot_id = boot_id_of(version, head.inputs, self._settings)
+        self._say(STREAM, envelopes(numbered, boot_id=boot_id, stamp_ns=stamp_ns))
+        self._version = version
+        self._instruments.map_version.set(version)
+
+    def _say(self, stream: str, rows: Sequence[Envelope[Event]]) -> None:
+        """Events appended, then published."""
+        if not rows:
+            return
+        self._log.append(stream, rows)
+        if self._bus is not None:
+            root, name, frame = self._root, self._map_name, self._frame
+            self._bus.publish_all(
+                [event_message(row, key=key_of(row, root=root, map_name=name, frame=frame)) for row in rows]
+            )
+
+    def _solve(self) -> None:
+        """A whole solve taken in if it is there, or begun if it is called for."""
+        if self._solver.busy:
+            found = self._solver.result()
+            if found is not None:
+                self._take_whole(found)
+            return
+        reason = self._reason_to_solve()
+        if reason:
+            logger.info("solving the whole map", extra={"reason": reason})
+            self._solved_s, self._correction_s = time.monotonic(), None
+            self._solver.begin()
+
+    def _reason_to_solve(self) -> str:
+        assert self._fleet is not None, "begun before"
+        live, now_s, growing = self._settings.live, time.monotonic(), self._fleet.map
+        if self._correction_s is not None and now_s >= self._correction_s + live.correction_delay_s:
+            return "labels or excluded drives changed"
+        if now_s >= self._solved_s + live.solve_interval_s:
+            if growing.doubt:
+                return growing.doubt
+            if growing.pose_count > live.pose_limit:
+                return f"the graph has {growing.pose_count} poses: {live.pose_limit} is the limit"
+        quiet = self._ready and now_s >= self._news_s + live.settle_s
+        if quiet and input_positions(self._log) not in (self._solved_inputs, self._tried_inputs):
+            return f"no news for {live.settle_s:g} s"
+        return ""
+
+    def _take_whole(self, found: WholeSolve) -> None:
+        """The map as a whole solve has it, and from there on what came since."""
+        assert self._fleet is not None, "begun before"
+        self._tried_inputs = found.inputs
+        self._instruments.solve_seconds.observe(time.monotonic() - self._solved_s)
+        for line in found.left_out:
+            logger.warning("%s", line)
+        if found.refusal:
+            logger.warning("the whole map cannot be solved: %s", found.refusal)
+            return
+        self._append_version(found.events, stamp_ns=found.stamp_ns)
+        self._solved_inputs = found.inputs
+        self._anchor_count = cast(MapSolved, found.events[-1]).anchor_count
+        self._excluded = excluded_drives(logged_corrections(self._log))
+        places = self._fleet.begin_anew(
+            [event for event in found.events if isinstance(event, LandmarkSolved)],
+            [event for event in found.events if isinstance(event, TrajectorySolved)],
+            excluded=self._excluded,
+        )
+        self._correct(places)
+
+
+def _is_vehicle(stream: str) -> bool:
+    return stream.startswith(VEHICLE_PREFIX)
+
+
+def _run_id(place: DrivePlace) -> str:
+    """The boot under which corrections of a drive are numbered from a stamp on."""
+    text = f"{place.vehicle}/{place.boot_id}/{place.stamp_ns}"
+    return blake2b(text.encode(), digest_size=8).hexdigest()

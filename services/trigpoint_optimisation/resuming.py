@@ -1,0 +1,108 @@
+"""Where live optimisation goes on: the newest map version, where drives were, and how far the log was taken in."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import cast
+
+from trigpoint.events.keys import STREAM_PATTERNS
+from trigpoint.events.mapped import LandmarkSolved, MapSolved, OdometryCorrected, TrajectorySolved
+from trigpoint.events.observed import VehicleDescribed
+from trigpoint.logs.ports import EventLog, LoggedEvent
+from trigpoint.logs.readings import VERDICT_STREAM, vehicle_streams
+from trigpoint_optimisation.app import STREAM
+from trigpoint_optimisation.core.live_fleet import Start, corrected_start, solved_start
+
+ODOMETRY_STREAM = STREAM_PATTERNS[OdometryCorrected]
+TAIL = 20_000  # corrections looked through for the newest of each drive: an hour of two vehicles
+
+DriveName = tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Resumed:
+    """The newest map version (0: none) with its landmarks and its newest measurement, the inputs of the newest whole
+    solve, where drives were and until when they were told so, and the numbers to read on from."""
+
+    version: int = 0
+    landmarks: tuple[LandmarkSolved, ...] = ()
+    anchor_count: int = 0
+    stamp_ns: int = 0
+    whole_inputs: tuple[tuple[str, int], ...] = ()
+    starts: Mapping[DriveName, Start] = field(default_factory=dict)
+    said_ns: Mapping[DriveName, int] = field(default_factory=dict)
+    vehicle_numbers: Mapping[str, int] = field(default_factory=dict)
+    verdict_number: int = 0
+
+
+def resumed(log: EventLog) -> Resumed:
+    """What the log says of it."""
+    begun = {stream: _newest_boot(log, stream) for stream in vehicle_streams(log)}
+    vehicle_numbers = {stream: number for stream, (number, _) in begun.items()}
+    heads = [(row.position.number, row.envelope.stamp_ns, cast(MapSolved, row.envelope.event)) for row in _heads(log)]
+    if not heads:
+        return Resumed(vehicle_numbers=vehicle_numbers)
+    _, stamp_ns, newest = heads[-1]
+    whole = max((row for row in heads if not row[2].base_version), key=lambda row: row[0], default=heads[0])
+    before = max((number for number, _, _ in heads if number < whole[0]), default=-1)
+    landmarks, paths = _parts(
+        log, before + 1, {head.map_version: head for number, _, head in heads if number >= whole[0]}
+    )
+    said = _corrections(log)
+    starts = {(path.vehicle, path.boot_id): solved_start(path) for path in paths if len(path.stamp_ns)}
+    for name, (said_ns, event) in said.items():
+        if name not in starts or said_ns > starts[name].stamp_ns:
+            starts[name] = corrected_start(said_ns, event)
+    return Resumed(
+        version=newest.map_version,
+        landmarks=tuple(landmarks.values()),
+        anchor_count=newest.anchor_count,
+        stamp_ns=stamp_ns,
+        whole_inputs=() if whole[2].method == "incremental" else whole[2].inputs,
+        starts=starts,
+        said_ns={name: said_ns for name, (said_ns, _) in said.items()},
+        vehicle_numbers=vehicle_numbers,
+        verdict_number=dict(newest.inputs).get(VERDICT_STREAM, 0),
+    )
+
+
+def _heads(log: EventLog) -> list[LoggedEvent]:
+    return list(log.read(STREAM, kinds=(MapSolved,)))
+
+
+def _parts(
+    log: EventLog, first_number: int, heads: Mapping[int, MapSolved]
+) -> tuple[dict[str, LandmarkSolved], list[TrajectorySolved]]:
+    """The landmarks of the newest version and the paths of the newest whole one."""
+    parts: dict[int, list[LandmarkSolved]] = {}
+    paths: dict[DriveName, TrajectorySolved] = {}
+    for row in log.read(STREAM, first_number=first_number, kinds=(LandmarkSolved, TrajectorySolved)):
+        event = row.envelope.event
+        if isinstance(event, LandmarkSolved):
+            parts.setdefault(event.map_version, []).append(event)
+        elif isinstance(event, TrajectorySolved) and event.map_version in heads:
+            paths[event.vehicle, event.boot_id] = event
+    landmarks: dict[str, LandmarkSolved] = {}
+    for version, head in sorted(heads.items()):
+        landmarks |= {event.landmark: event for event in parts.get(version, [])}
+        for name in head.removed:
+            landmarks.pop(name, None)
+    return landmarks, list(paths.values())
+
+
+def _corrections(log: EventLog) -> dict[DriveName, tuple[int, OdometryCorrected]]:
+    """The newest correction of each drive, and its stamp."""
+    first = max(log.next_number(ODOMETRY_STREAM) - TAIL, 0)
+    newest: dict[DriveName, tuple[int, OdometryCorrected]] = {}
+    for row in log.read(ODOMETRY_STREAM, first_number=first):
+        event = cast(OdometryCorrected, row.envelope.event)
+        newest[event.vehicle, event.boot_id] = row.envelope.stamp_ns, event
+    return newest
+
+
+def _newest_boot(log: EventLog, stream: str) -> tuple[int, str]:
+    """The number of the first event of a stream's newest boot that describes itself, and the boot."""
+    number, boot_id = 0, ""
+    for row in log.read(stream, kinds=(VehicleDescribed,)):
+        if row.envelope.identity.boot_id != boot_id:
+            number, boot_id = row.position.number, row.envelope.identity.boot_id
+    return number, boot_id
