@@ -1,111 +1,176 @@
-"""Filtering at work on live messages: each drive followed as ingest publishes it, the log read where one is missing."""
+"""Filtering as a service: the vehicles' streams in the log followed, from wherever it left off."""
 
 import logging
-from typing import cast
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Self, cast
 
 from trigpoint.bus.event_messages import event_message
-from trigpoint.bus.listening import ListeningService
-from trigpoint.bus.ports import Bus, BusMessage
-from trigpoint.errors import EventRejected
-from trigpoint.events.codec import Event, decode
+from trigpoint.bus.ports import Bus
+from trigpoint.events.codec import Event
 from trigpoint.events.envelope import Envelope
-from trigpoint.events.estimated import Estimated
-from trigpoint.events.keys import DEFAULT_ROOT, KEY_VERSION, STREAM_PATTERNS, key_of
-from trigpoint.events.observed import Observed, VehicleDescribed
+from trigpoint.events.estimated import Estimated, FixJudged
+from trigpoint.events.keys import DEFAULT_ROOT, KEY_VERSION, key_of
+from trigpoint.events.observed import Observed
 from trigpoint.geodesy.projection import MapFrame
-from trigpoint.logs.ports import EventLog
-from trigpoint.logs.readings import pinned_frame
-from trigpoint_filtering.app import STREAM, said_of
-from trigpoint_filtering.core.follower import DriveFollower
+from trigpoint.logs.following import StreamFollower
+from trigpoint.logs.ports import RecallingLog
+from trigpoint.logs.readings import VEHICLE_PREFIX, pinned_frame, vehicle_streams
+from trigpoint.observability.metrics import Instruments
+from trigpoint_filtering.app import KINDS, STREAM
+from trigpoint_filtering.core.fleet_following import KEPT_BOOTS, DriveName, FleetFollower
+from trigpoint_filtering.core.follower import REORDER_NS
+from trigpoint_filtering.core.publication import output_boot_id
 from trigpoint_filtering.settings import FilterSettings
 
-IDLE_S = 0.05  # between two looks at an empty queue: what was estimated is appended at each
-BATCH = 256  # estimates appended at a time
-VEHICLE_STREAM = STREAM_PATTERNS[VehicleDescribed]
+LOOK_S = 0.5  # between two looks at the log when nobody tells of news
+GATHER_S = 0.02  # after the first word of news: what comes together is appended together
+BATCH = 1024  # events taken at a time
+CLOSE_S = 5.0  # for what is still in the log when it is told to stop
 
 logger = logging.getLogger(__name__)
 
 
-class LiveFiltering(ListeningService):
-    """Hears what vehicles measured; appends its estimates, then publishes them. Close it, or leave its `with`."""
+class LiveFiltering:
+    """Takes every vehicle's events from the log, in its order; appends its estimates, then publishes them.
+
+    A message on the bus only wakes it up, so that nothing is lost with one. After a restart each drive is filtered
+    from its beginning again, and what was said of it is not said twice. Close it, or leave its `with`.
+    """
 
     def __init__(
-        self, log: EventLog, bus: Bus, settings: FilterSettings | None = None, *, root: str = DEFAULT_ROOT
+        self,
+        log: RecallingLog,
+        bus: Bus,
+        settings: FilterSettings | None = None,
+        *,
+        root: str = DEFAULT_ROOT,
+        instruments: Instruments | None = None,
     ) -> None:
         self._log, self._bus, self._root = log, bus, root
         self._settings = settings or FilterSettings()
-        self._frame: MapFrame | None = None
-        self._said = {boot_id: said.count for boot_id, said in said_of(log).items()}
-        self._followers: dict[tuple[str, str], DriveFollower] = {}
-        self._expected: dict[tuple[str, str], int] = {}
-        self._pending: list[Envelope[Estimated]] = []
-        super().__init__(bus.subscribe(f"{root}/{KEY_VERSION}/veh/*/obs/**"), idle_s=IDLE_S)
+        self._instruments = instruments or Instruments("filtering")
+        self._said = _said_before(log)
+        self._streams = StreamFollower(log, lambda stream: stream.startswith(VEHICLE_PREFIX), kinds=KINDS)
+        self._fleet: FleetFollower | None = None
+        self._had_all_s = time.monotonic()
+        self._closed = False
+        self.ready = False
+        self._subscription = bus.subscribe(f"{root}/{KEY_VERSION}/veh/*/obs/**")
+
+    def run(self, stop: threading.Event) -> None:
+        """Works until told to stop. Raises AppendFailed when the log cannot be written: then it must stop."""
+        while not stop.is_set():
+            if not self.step(LOOK_S) and not self.ready:
+                stop.wait(LOOK_S)
 
     def step(self, timeout_s: float) -> bool:
-        """One message taken, or none within the timeout (then False, and what was estimated is in the log)."""
-        message = self._subscription.receive(timeout_s)
-        if message is not None:
-            self._take(message)
-        if message is None or len(self._pending) >= BATCH:
-            self.flush()
-        return message is not None
+        """What the log has next taken, appended and published; without news, some waited for (then False if none)."""
+        if self._take():
+            return True
+        self.ready = True
+        if self._subscription.receive_run(timeout_s) is None:
+            return False
+        threading.Event().wait(min(GATHER_S, timeout_s))
+        for _ in range(self._subscription.waiting):
+            self._subscription.receive_run(0.0)
+        return True
 
-    def _take(self, message: BusMessage) -> None:
-        drive, sequence = (message.identity.source, message.identity.boot_id), message.identity.sequence
-        self._frame = self._frame or pinned_frame(self._log)
-        expected = self._expected.get(drive, 0)
-        if self._frame is None or sequence < expected:
-            return  # before the frame is pinned nothing can be placed: the log still has the message then
-        try:
-            event = cast(Observed, decode(message.schema_name, message.payload))
-        except EventRejected as error:
-            logger.warning("%s on %s is left to the log: %s", message.identity, message.key, error)
+    def _take(self) -> bool:
+        """Whether there were events, and a frame to place them in."""
+        fleet = self._fleet = self._fleet or self._begun()
+        if fleet is None:
+            return False
+        logged = self._streams.take(BATCH)
+        rows = [told for row in logged for told in fleet.take(cast(Envelope[Observed], row.envelope))]
+        self._append(rows)
+        self._show_lag()
+        return bool(logged)
+
+    def _begun(self) -> FleetFollower | None:
+        """The fleet from the beginning of the log; None before a frame is pinned: the log keeps the events."""
+        frame = pinned_frame(self._log)
+        return None if frame is None else FleetFollower(frame, self._settings, ended=tuple(self._whole_drives(frame)))
+
+    def _whole_drives(self, frame: MapFrame) -> Iterator[DriveName]:
+        """Drives a later one followed, of which everything was said: estimates reach what only an end gives out."""
+        for stream in vehicle_streams(self._log):
+            for boot in self._log.boots(stream)[:-KEPT_BOOTS]:
+                said = self._said.get(output_boot_id(boot.source, boot.boot_id, frame, self._settings))
+                if said is not None and said.newest_ns > boot.end_ns - REORDER_NS:
+                    yield boot.source, boot.boot_id
+
+    def _append(self, told: Sequence[Envelope[Estimated]]) -> None:
+        """What was not yet said of it in the log, then published."""
+        rows = [row for row in told if row.identity.sequence >= self._said.get(row.identity.boot_id, NOTHING).count]
+        if not rows:
             return
-        if sequence > expected:
-            self.catch_up(drive, until_sequence=sequence)
-        self._follow(Envelope(message.identity, message.stamp_ns, event), self._frame)
-
-    def catch_up(self, drive: tuple[str, str], *, until_sequence: int | None = None) -> None:
-        """The drive's events that are in the log and were not heard, taken, up to a sequence."""
-        frame = self._frame = self._frame or pinned_frame(self._log)
-        if frame is None:
-            return
-        missing = []
-        for logged in self._log.read(VEHICLE_STREAM.format(vehicle=drive[0])):
-            identity = logged.envelope.identity
-            early = until_sequence is None or identity.sequence < until_sequence
-            if identity.boot_id == drive[1] and early and identity.sequence >= self._expected.get(drive, 0):
-                missing.append(cast(Envelope[Observed], logged.envelope))
-        logger.info("drive %s of %s: %d events taken from the log", drive[1], drive[0], len(missing))
-        for row in sorted(missing, key=lambda row: row.identity.sequence):
-            self._follow(row, frame)
-
-    def _follow(self, row: Envelope[Observed], frame: MapFrame) -> None:
-        drive = (row.identity.source, row.identity.boot_id)
-        self._expected[drive] = row.identity.sequence + 1
-        follower = self._followers.get(drive)
-        if follower is None:
-            described = row.event if isinstance(row.event, VehicleDescribed) else VehicleDescribed(vehicle=drive[0])
-            follower = self._followers[drive] = DriveFollower(described, drive[1], frame, self._settings)
-        self._pending += self._unsaid(follower.take(row))
-
-    def _unsaid(self, rows: list[Envelope[Estimated]]) -> list[Envelope[Estimated]]:
-        return [row for row in rows if row.identity.sequence >= self._said.get(row.identity.boot_id, 0)]
-
-    def flush(self) -> None:
-        """What was estimated is in the log, then published."""
-        if not self._pending:
-            return
-        rows = cast(list[Envelope[Event]], self._pending)
-        self._log.append(STREAM, rows)
-        self._pending = []
+        began_s = time.perf_counter()
+        self._log.append(STREAM, cast(list[Envelope[Event]], rows))
+        self._instruments.fsync_seconds.observe(time.perf_counter() - began_s)
         for row in rows:
-            self._bus.publish(event_message(row, key=key_of(row, root=self._root)))
+            self._bus.publish(event_message(cast(Envelope[Event], row), key=key_of(row, root=self._root)))
+            self._count(row.event)
+
+    def _count(self, event: Estimated) -> None:
+        if isinstance(event, FixJudged) and event.accepted:
+            self._instruments.accepted.labels(event.vehicle).inc()
+        elif isinstance(event, FixJudged):
+            self._instruments.rejected.labels(event.vehicle, event.reason).inc()
+
+    def _show_lag(self) -> None:
+        lag_events = self._streams.lag
+        if not lag_events:
+            self._had_all_s = time.monotonic()
+        self._instruments.projection_lag_events.set(lag_events)
+        self._instruments.projection_lag_seconds.set(time.monotonic() - self._had_all_s if lag_events else 0.0)
 
     def close(self) -> None:
-        """Every drive followed to the end of what the log has of it; the subscription ended."""
+        """What the log has is taken, for at most `CLOSE_S`, and if that was all, what still waited for later events
+        is given out; again: no effect."""
+        if self._closed:
+            return
+        self._closed, self.ready = True, False
         self._subscription.close()
-        for drive, follower in self._followers.items():
-            self.catch_up(drive)
-            self._pending += self._unsaid(follower.finish())
-        self.flush()
+        until_s = time.monotonic() + CLOSE_S
+        while self._take():
+            if time.monotonic() > until_s:
+                logger.warning("stopped before the end of the log", extra={"lag_events": self._streams.lag})
+                return
+        if self._fleet is not None:
+            self._append(list(self._fleet.finish()))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.close()
+        else:
+            self._subscription.close()
+
+
+@dataclass(frozen=True, slots=True)
+class _SaidBefore:
+    """How many of a drive's estimates are in the log, and the stamp of the newest."""
+
+    count: int
+    newest_ns: int
+
+
+NOTHING = _SaidBefore(0, -1)
+
+
+def _said_before(log: RecallingLog) -> dict[str, _SaidBefore]:
+    """What filtering has appended, by its own boots; only headers are read for it."""
+    said: dict[str, _SaidBefore] = {}
+    for run in log.read_headers(STREAM):
+        before = said.get(run.boot_id, NOTHING)
+        count = max(before.count, int(run.sequences.max()) + 1)
+        said[run.boot_id] = _SaidBefore(count, max(before.newest_ns, int(run.stamps_ns.max())))
+    return said

@@ -14,4 +14,6 @@ from trigpoint_filtering.live import LiveFiltering
 def opened(settings: Settings, instruments: Instruments) -> Iterator[Service]:
     """Filtering on the fleet's log and bus."""
     with opened_resources(settings) as resources:
-        yield LiveFiltering(resources.log, resources.bus, settings.filtering, root=settings.fleet.root)
+        yield LiveFiltering(
+            resources.log, resources.bus, settings.filtering, root=settings.fleet.root, instruments=instruments
+        )

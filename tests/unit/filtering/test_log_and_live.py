@@ -10,7 +10,7 @@ import pytest
 from driven_paths.examples import FRAME, START_NS, Course, driven
 from trigpoint.bus.event_messages import event_message
 from trigpoint.bus.memory_bus import MemoryBus, MemoryExchange, MemorySubscription
-from trigpoint.bus.ports import BusMessage
+from trigpoint.bus.ports import BusMessage, BusRun
 from trigpoint.events.codec import Event, decode, encode
 from trigpoint.events.drives import Drive
 from trigpoint.events.envelope import Envelope, EventIdentity
@@ -18,6 +18,7 @@ from trigpoint.events.estimated import FixJudged, PoseFiltered
 from trigpoint.events.keys import key_of
 from trigpoint.events.observed import GnssFixReceived, ImuMeasured, MapFramePinned, WheelSpeedMeasured
 from trigpoint.logs.memory_log import MemoryLog
+from trigpoint.observability.metrics import Instruments
 from trigpoint_filtering.app import filter_log
 from trigpoint_filtering.live import LiveFiltering
 
@@ -163,31 +164,67 @@ def test_a_restarted_service_says_nothing_twice() -> None:
 
 
 class SteadyBus(MemoryBus):
-    """A bus on which the next message is there for whoever waits, in bursts of ten for whoever only looks."""
+    """A bus on which there is always one more message; told to stop after some of them."""
 
-    def __init__(self, rows: Sequence[Envelope[Event]], stop: threading.Event) -> None:
+    def __init__(self, row: Envelope[Event], stop: threading.Event) -> None:
         super().__init__()
-        self._rows, self._stop, self._taken = list(rows), stop, 0
+        self._row, self._stop, self._heard = row, stop, 0
 
     def subscribe(self, key_expression: str) -> MemorySubscription:
         subscription = super().subscribe(key_expression)
-        subscription.receive = self._next  # type: ignore[method-assign]
-        return subscription
+        receive_run = subscription.receive_run
 
-    def _next(self, timeout_s: float) -> BusMessage | None:
-        self._taken += 1
-        if timeout_s == 0.0 and self._taken % 10 == 0:
-            return None
-        if len(self._rows) == 1:
-            self._stop.set()
-        return message_of(self._rows.pop(0))
+        def next_run(timeout_s: float) -> BusRun | None:
+            self.publish(message_of(self._row))
+            self._heard += 1
+            if self._heard > 5:
+                self._stop.set()
+            return receive_run(timeout_s)
+
+        subscription.receive_run = next_run  # type: ignore[method-assign]
+        return subscription
 
 
 def test_estimates_are_in_the_log_while_messages_never_cease() -> None:
     rows = rows_of(driven(COURSE).drive)[:200]
     log, stop = pinned_log(rows), threading.Event()
-    LiveFiltering(log, SteadyBus(rows, stop)).run(stop)
+    LiveFiltering(log, SteadyBus(rows[0], stop)).run(stop)
     assert said(log)
+
+
+def test_a_service_is_ready_once_it_has_taken_what_the_log_holds() -> None:
+    log = pinned_log(rows_of(driven(COURSE).drive))
+    instruments = Instruments("filtering")
+    with MemoryBus() as bus, LiveFiltering(log, bus, instruments=instruments) as service:
+        assert not service.ready
+        assert service.step(0.0)
+        while service.step(0.0):
+            pass
+        assert service.ready
+    assert b"trigpoint_projection_lag_events 0.0" in instruments.exposition()
+
+
+@pytest.mark.parametrize("cut", [1, 37, 250])
+def test_a_service_started_anew_goes_on_where_the_one_before_was_killed(cut: int) -> None:
+    rows = rows_of(driven(COURSE).drive)
+    whole, killed = pinned_log(rows), pinned_log(rows)
+    filter_log(whole)
+    killed.append("filtering", [logged.envelope for logged in whole.read("filtering")][:cut])
+    heard_live(killed, [], [])
+    assert said(killed) == said(whole)
+
+
+def test_a_drive_that_comes_after_others_of_its_vehicle_is_followed_and_the_old_ones_are_let_go() -> None:
+    rows = rows_of(driven(Course(duration_s=15.0)).drive)
+    boots = [[replace(row, identity=replace(row.identity, boot_id=f"boot-{n}")) for row in rows] for n in range(5)]
+    whole, live = pinned_log(), pinned_log()
+    for boot in boots:
+        whole.append("veh-car", boot)
+        live.append("veh-car", boot)
+    filter_log(whole)
+    heard_live(live, [], [])
+    heard_live(live, [], [])
+    assert sorted(said(live), key=str) == sorted(said(whole), key=str)
 
 
 def test_estimates_are_published_once_they_are_in_the_log() -> None:
