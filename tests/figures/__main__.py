@@ -9,10 +9,12 @@ from pathlib import Path
 from figures import (
     campus,
     demo,
+    faults_ingest,
     faults_link,
     faults_log,
     faults_postgis,
     faults_services,
+    ingest,
     mrclam,
     nclt,
     projection,
@@ -29,8 +31,14 @@ GROUPS: Mapping[str, Sequence[Figure]] = {
     "nclt": nclt.FIGURES,
     "campus": campus.FIGURES,
     "demo": demo.FIGURES,
-    "faults": (*faults_link.FIGURES, *faults_log.FIGURES, *faults_postgis.FIGURES, *faults_services.FIGURES),
-    "ingest": projection.FIGURES,
+    "faults": (
+        *faults_ingest.FIGURES,
+        *faults_link.FIGURES,
+        *faults_log.FIGURES,
+        *faults_postgis.FIGURES,
+        *faults_services.FIGURES,
+    ),
+    "ingest": (*ingest.FIGURES, *projection.FIGURES),
     "security": (*security.FIGURES, *security_fuzz.FIGURES),
 }
 PROGRAM = (str(Path(sys.executable).with_name("trigpoint")),)
