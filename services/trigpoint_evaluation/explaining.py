@@ -10,7 +10,7 @@ from trigpoint.errors import InputError
 from trigpoint.events.corrected import AnchorLabelled, Corrected
 from trigpoint.events.envelope import LogPosition
 from trigpoint.events.keys import STREAM_PATTERNS
-from trigpoint.events.mapped import AnchorAssociated, ImageOffsetSolved, MapSolved, TrajectorySolved
+from trigpoint.events.mapped import AnchorAssociated, ImageOffsetSolved, Mapped, MapSolved, TrajectorySolved
 from trigpoint.events.names import nearest_names
 from trigpoint.events.observed import LandmarksDetected, VehicleDescribed
 from trigpoint.landmarks.model import Landmark, MapVersion, valid_at
@@ -96,45 +96,57 @@ def _absence(store: LandmarkStore, landmark: str, history: Sequence[Landmark], m
 
 
 def _parts_of(log: EventLog, versions: Sequence[MapVersion], row: Landmark, map_version: int) -> _Parts:
-    """The paths and associations behind a row, from the version back over those it is based on until all are found."""
-    parts, drives = _Parts(), set(sweeps_of(row))
-    by_number = {version.map_version: version for version in versions}
-    at = by_number.get(map_version)
-    while at is not None:
-        _take(parts, _rows_of(log, versions, at), row, drives)
-        tied = {anchor for anchor, _ in parts.tied}
-        found_all = drives <= parts.paths.keys() and tied >= set(row.anchors)
-        at = None if found_all else by_number.get(at.base_version)
+    """The paths and associations behind a row. Versions that say only what changed have no paths of what was driven
+    since: that of the next whole one tells as well which of a sweep's detections is the landmark."""
+    parts, by_number = _Parts(), {version.map_version: version for version in versions}
+    whole = at = by_number[map_version]
+    while whole.base_version in by_number:
+        whole = by_number[whole.base_version]
+    for logged in _rows_between(log, versions, whole, at):
+        _take(parts, logged, row.landmark)
+    following = (one for one in versions if one.map_version > map_version and not one.base_version)
+    later = next(following, None) if at.base_version else None
+    if later is not None:
+        for logged in _rows_between(log, versions, later, later, kinds=(MapSolved, TrajectorySolved)):
+            _take(parts, logged, row.landmark)
     return parts
 
 
-def _rows_of(log: EventLog, versions: Sequence[MapVersion], version: MapVersion) -> list[LoggedEvent]:
-    """A version's events, but for its landmarks: those before its MapSolved that its writer wrote for it."""
-    first = max((one.log_number + 1 for one in versions if one.log_number < version.log_number), default=0)
-    read = log.read(version.log_stream, first_number=first, kinds=PARTS)
-    rows = list(takewhile(lambda row: row.position.number <= version.log_number, read))
-    if not rows:
-        return []
-    writer = rows[-1].envelope.identity
-    return [
-        row
-        for row in rows
-        if (row.envelope.identity.source, row.envelope.identity.boot_id) == (writer.source, writer.boot_id)
-    ]
+def _rows_between(
+    log: EventLog,
+    versions: Sequence[MapVersion],
+    first: MapVersion,
+    last: MapVersion,
+    *,
+    kinds: Sequence[type] = PARTS,
+) -> Iterable[LoggedEvent]:
+    """The events of the versions from the first to the last, but for their landmarks: those that the writer of a
+    version's MapSolved wrote for it."""
+    number = max((one.log_number + 1 for one in versions if one.log_number < first.log_number), default=0)
+    read = log.read(first.log_stream, first_number=number, kinds=kinds)
+    rows = list(takewhile(lambda row: row.position.number <= last.log_number, read))
+    known = {version.log_number for version in versions}
+    closed = {_version_of(row) for row in rows if row.position.number in known}
+    return (row for row in rows if _version_of(row) in closed)
 
 
-def _take(parts: _Parts, rows: Iterable[LoggedEvent], landmark: Landmark, drives: set[DriveName]) -> None:
-    """What the rows of one version say that no newer one has said."""
-    paths, tied, offsets = dict(parts.paths), dict(parts.tied), dict(parts.offsets)
-    for row in rows:
-        event = row.envelope.event
-        if isinstance(event, TrajectorySolved) and (event.vehicle, event.boot_id) in drives:
-            paths[event.vehicle, event.boot_id] = event
-        elif isinstance(event, AnchorAssociated) and event.landmark == landmark.landmark:
-            tied[event.anchor, event.image] = event, row.position
-        elif isinstance(event, ImageOffsetSolved):
-            offsets[event.image] = event
-    parts.paths, parts.tied, parts.offsets = paths | parts.paths, tied | parts.tied, offsets | parts.offsets
+def _version_of(row: LoggedEvent) -> tuple[str, str, int]:
+    """The writer, its boot and the number of the version it wrote the event for."""
+    identity, event = row.envelope.identity, cast(Mapped, row.envelope.event)
+    return identity.source, identity.boot_id, event.map_version
+
+
+def _take(parts: _Parts, row: LoggedEvent, landmark: str) -> None:
+    """What a row says of the landmark, in place of what was said before."""
+    event = row.envelope.event
+    if isinstance(event, TrajectorySolved):
+        parts.paths[event.vehicle, event.boot_id] = event
+    elif isinstance(event, ImageOffsetSolved):
+        parts.offsets[event.image] = event
+    elif isinstance(event, AnchorAssociated) and event.landmark == landmark:
+        parts.tied[event.anchor, event.image] = event, row.position
+    elif isinstance(event, AnchorAssociated):
+        parts.tied.pop((event.anchor, event.image), None)
 
 
 def _seen(log: EventLog, row: Landmark, drive: DriveName, sweeps: Sequence[int], parts: _Parts) -> list[Sighting]:

@@ -6,12 +6,23 @@ from typing import cast
 
 import pytest
 
+from landmark_maps.examples import (
+    START_NS,
+    append_mapped,
+    associated,
+    closing,
+    pin_frame,
+    solved_landmark,
+    solved_trajectory,
+)
 from solved_worlds.examples import Lap, World, world
 from solved_worlds.logged import append_world, drive_rows
 from trigpoint.errors import InputError
+from trigpoint.events.codec import Event
 from trigpoint.events.corrected import AnchorLabelled, AnchorRetracted, DriveExcluded
+from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.mapped import LandmarkSolved
-from trigpoint.events.observed import LandmarksDetected
+from trigpoint.events.observed import LandmarkDetection, LandmarksDetected, VehicleDescribed
 from trigpoint.landmarks.memory_store import MemoryStore
 from trigpoint.logs.mcap_log import McapLog
 from trigpoint.logs.memory_log import MemoryLog
@@ -167,3 +178,34 @@ def _append_in_groups(log: EventLog, driven: World) -> None:
     rows = drive_rows(driven.drives[0])
     for start in range(0, len(rows), GROUP):
         log.append(f"veh-{driven.drives[0].vehicle}", rows[start : start + GROUP])
+
+
+def test_an_anchor_let_go_by_a_later_change_is_tied_no_more_and_a_path_comes_from_the_next_whole_version() -> None:
+    log, store = MemoryLog(), MemoryStore()
+    pin_frame(log)
+    described = VehicleDescribed(vehicle="veh-a")
+    seen = LandmarkDetection(range_m=5.0, bearing_rad=0.0, kind="pole", signature="", diameter_m=0.2)
+    other = replace(seen, range_m=40.0)
+    sweep = LandmarksDetected(detections=(other, seen))
+    events: list[Event] = [described, sweep, sweep]
+    log.append(
+        "veh-veh-a",
+        [
+            Envelope(EventIdentity("veh-a", "boot-1", sequence), START_NS + sequence * 100_000_000, event)
+            for sequence, event in enumerate(events)
+        ],
+    )
+    landmark = replace(
+        solved_landmark("L1", 5.0, 0.0), observations=(("veh-a", "boot-1", 1), ("veh-a", "boot-1", 2)), anchors=()
+    )
+    tied = replace(associated("anchor-1", "L1"), image="tile-1")
+    append_mapped(log, [landmark, tied, closing(1, 1)])
+    change = replace(closing(2, 1), base_version=1)
+    append_mapped(log, [replace(landmark, map_version=2), replace(tied, map_version=2, landmark=""), change])
+    append_mapped(
+        log, [replace(landmark, map_version=3), solved_trajectory(map_version=3), closing(3, 1)], boot_id="boot-2"
+    )
+    project(log, store)
+    found = explained(log, store, "L1", as_of=2)
+    assert (len(explained(log, store, "L1", as_of=1).anchors), found.anchors) == (1, ())
+    assert [one.range_m for one in found.sightings] == [5.0, 5.0]  # the path drives east at 10 m/s from the origin
