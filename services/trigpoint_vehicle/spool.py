@@ -3,6 +3,7 @@
 import contextlib
 import fcntl
 import logging
+import os
 import threading
 import time
 from collections import deque
@@ -14,14 +15,16 @@ from typing import TextIO
 from trigpoint.errors import AppendFailed, InputError, ServiceError
 from trigpoint_vehicle.core.outgoing import Outgoing
 from trigpoint_vehicle.core.spool_records import (
+    HEAD_BYTES,
     MESSAGE,
+    SEALED,
     SpoolChannel,
     channel_record,
     encode_record,
     segment_record,
     whole_records,
 )
-from trigpoint_vehicle.core.spool_walk import contents_of, without_data
+from trigpoint_vehicle.core.spool_walk import contents_of, sealed_contents, without_data
 from trigpoint_vehicle.settings import VehicleSettings
 from trigpoint_vehicle.spool_reading import SpoolReader, require_vehicle
 from trigpoint_vehicle.spool_segments import (
@@ -94,17 +97,20 @@ class Spool:
                 raise ServiceError(f"{path}: cannot be read: {error}") from error
 
     def _find(self, number: int, path: Path) -> None:
-        data = path.read_bytes()
-        found = contents_of(data)
-        if data and not found.whole_bytes:
+        with path.open("rb") as file:
+            first = whole_records(file.read(HEADS_BYTES), 0, count=1)[0]
+            size = file.seek(0, os.SEEK_END)
+            file.seek(max(size - HEAD_BYTES, 0))
+            found = sealed_contents(size, file.read())
+        if first:
+            require_vehicle(first[0], self._vehicle, path)
+        if found is None:
+            found = contents_of(path.read_bytes())
+        if size and not found.whole_bytes:
             aside = path.rename(path.with_suffix(DAMAGED_SUFFIX))
-            logger.error("%s: no whole record in %d bytes, kept aside", aside, len(data))
+            logger.error("%s: no whole record in %d bytes, kept aside", aside, size)
             return
-        records, _ = whole_records(data, 0, count=1)
-        first = records[0] if records else None
-        if first is not None:
-            require_vehicle(first, self._vehicle, path)
-        if found.whole_bytes < len(data):
+        if found.whole_bytes < size:
             logger.warning("%s: cut behind its last whole record, at byte %d", path, found.whole_bytes)
             with path.open("r+b") as file:
                 file.truncate(found.whole_bytes)
@@ -112,7 +118,7 @@ class Spool:
         self._segments.append(segment)
         self._disk_bytes += segment.size
         self._await(segment, messages=found.messages, payload_bytes=found.payload_bytes)
-        self._oldest_ns = self._oldest_ns or (first.spooled_ns if first is not None else 0)
+        self._oldest_ns = self._oldest_ns or (first[0].spooled_ns if first else 0)
 
     def append(self, channel: SpoolChannel, sequence: int, stamp_ns: int, payload: bytes) -> None:
         """The message is with the operating system; it is read back once it is durable.
@@ -130,7 +136,7 @@ class Spool:
             try:
                 writer.append(data)
             except AppendFailed:
-                self._seal(writer)  # what is behind its end is never read, whatever was left there
+                self._end(writer)  # what is behind its end is never read, whatever was left there
                 raise
             self._channels[channel] = number
             self._disk_bytes += len(data)
@@ -168,6 +174,14 @@ class Spool:
         return writer
 
     def _seal(self, writer: SegmentWriter) -> None:
+        segment = writer.segment
+        seal = encode_record(SEALED, 0, segment.messages, segment.payload_bytes, self._now_ns())
+        with contextlib.suppress(AppendFailed):  # without it, the segment is read through when it is found again
+            writer.append(seal)
+            self._disk_bytes += len(seal)
+        self._end(writer)
+
+    def _end(self, writer: SegmentWriter) -> None:
         writer.segment.sealed = True
         self._writer = None
 

@@ -73,13 +73,13 @@ class SegmentWriter:
             self._handle = os.open(segment.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o600)
         except OSError as error:
             raise AppendFailed(f"{segment.path}: cannot be made: {error}") from error
+        self._is_listed = False  # whether the folder is known to hold it after a loss of power
         try:
             self.append(beginning)
-            sync_folder(segment.path.parent)
-        except (OSError, AppendFailed) as error:
+        except AppendFailed:
             self.close()
             segment.path.unlink(missing_ok=True)
-            raise AppendFailed(f"{segment.path}: cannot be begun: {error}") from error
+            raise
 
     def append(self, data: bytes) -> None:
         """The bytes are with the operating system, whole: they outlive this process. Raises AppendFailed."""
@@ -102,8 +102,11 @@ class SegmentWriter:
         """The first `size` bytes outlive a loss of power. Raises AppendFailed."""
         try:
             os.fsync(self._handle)
+            if not self._is_listed:
+                sync_folder(self.segment.path.parent)
         except OSError as error:
             raise AppendFailed(f"{self.segment.path}: cannot be fsynced: {error}") from error
+        self._is_listed = True
         self.segment.durable = size
 
     def close(self) -> None:

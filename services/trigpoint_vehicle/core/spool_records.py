@@ -6,6 +6,7 @@ sequence i64, stamp in ns i64, time of spooling in ns i64, body. What the fields
 - SEGMENT, the first of a file: body is the vehicle and the boot that writes it, `sequence` the boot's next number.
 - CHANNEL, before a channel is used: body is source, boot id, schema name, and "n" where its numbers leave no gaps.
 - MESSAGE: body is the payload.
+- SEALED, the last of a file that was closed in order: it holds `sequence` messages with `stamp` bytes of payload.
 - DROPPED: messages `sequence` to `stamp` (both included) of the channel's boot were dropped, unsent.
 """
 
@@ -16,8 +17,8 @@ from typing import NamedTuple
 
 from trigpoint.errors import InputError, LogDamaged
 
-SEGMENT, CHANNEL, MESSAGE, DROPPED = 1, 2, 3, 4
-KINDS = frozenset((SEGMENT, CHANNEL, MESSAGE, DROPPED))
+SEGMENT, CHANNEL, MESSAGE, DROPPED, SEALED = 1, 2, 3, 4, 5
+KINDS = frozenset((SEGMENT, CHANNEL, MESSAGE, DROPPED, SEALED))
 FORMAT = "trigpoint spool 1"
 MARK = 0xA5
 _CRC = struct.Struct("<I")

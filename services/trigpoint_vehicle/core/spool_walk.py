@@ -9,6 +9,7 @@ from trigpoint_vehicle.core.spool_records import (
     CHANNEL,
     DROPPED,
     MESSAGE,
+    SEALED,
     SEGMENT,
     Record,
     SpoolChannel,
@@ -83,6 +84,17 @@ def contents_of(data: bytes) -> Contents:
         whole_bytes=gaps[-1].start if ends_damaged else len(data),
         gaps=gaps,
     )
+
+
+def sealed_contents(size_bytes: int, tail: bytes) -> Contents | None:
+    """What a segment of so many bytes says it holds, by its last ones (HEAD_BYTES); None if it was not closed in order.
+
+    What is damaged inside of it is found when it is read.
+    """
+    records, _ = whole_records(tail, 0, count=1)
+    if not records or records[0].kind != SEALED:
+        return None
+    return Contents(messages=records[0].sequence, payload_bytes=records[0].stamp_ns, whole_bytes=size_bytes, gaps=())
 
 
 def without_data(segments: Sequence[bytes]) -> Dropped:

@@ -14,7 +14,7 @@ from trigpoint.events.codec import schema_name
 from trigpoint.events.observed import ImuMeasured, VehicleDescribed
 from trigpoint.events.uplink import DROPPED_SCHEMA
 from trigpoint_vehicle.core.outgoing import Outgoing
-from trigpoint_vehicle.core.spool_records import SpoolChannel
+from trigpoint_vehicle.core.spool_records import HEAD_BYTES, SpoolChannel
 from trigpoint_vehicle.settings import VehicleSettings
 from trigpoint_vehicle.spool import Spool
 
@@ -53,6 +53,11 @@ def everything(spool: Spool) -> list[Outgoing]:
 
 def numbers(spool: Spool) -> list[tuple[str, int]]:
     return [(one.channel.boot_id, one.sequence) for one in everything(spool)]
+
+
+def cut_off(path: Path, cut_bytes: int) -> None:
+    """The file as a crash leaves it: without its seal, and without the end of its last message."""
+    path.write_bytes(path.read_bytes()[: -HEAD_BYTES - cut_bytes])
 
 
 def segments(folder: Path) -> list[Path]:
@@ -129,9 +134,17 @@ def test_a_torn_tail_is_cut_and_what_is_whole_before_it_stays(tmp_path: Path, cu
     with spool(tmp_path) as one:
         fill(one, range(3))
     (path,) = segments(tmp_path)
-    path.write_bytes(path.read_bytes()[:-cut_bytes])
+    cut_off(path, cut_bytes)
     with spool(tmp_path, "boot-2") as again:
         assert numbers(again) == [("boot-1", 0), ("boot-1", 1)]
+
+
+def test_a_segment_that_was_not_closed_is_read_through_and_counted(tmp_path: Path) -> None:
+    with spool(tmp_path) as one:
+        fill(one, range(3))
+    cut_off(segments(tmp_path)[0], 0)
+    with spool(tmp_path, "boot-2") as again:
+        assert (again.behind.messages, again.behind.bytes) == (3, 1500)
 
 
 def test_a_damaged_message_is_told_of_under_its_number_and_the_others_stay(tmp_path: Path) -> None:
