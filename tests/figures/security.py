@@ -12,7 +12,7 @@ from pathlib import Path
 from command_runs.processes import fleet_in, trigpoint_process
 from figures.figure import Figure, Measurement, at_least, at_most
 from figures.workbench import CommandFailed, Workbench
-from secured_fleet.fleet import SecuredFleet, authority_of, comes_true, files_of, issue, message, secured_fleet
+from secured_fleet.fleet import SecuredFleet, authority_of, comes_true, files_of, message, secured_fleet
 from trigpoint.bus.ports import BusMessage
 from trigpoint.bus.register import Role
 from trigpoint.bus.tls import TlsFiles
@@ -99,15 +99,13 @@ def unknown_certificate(fleet: SecuredFleet) -> int:
 
 def expired_certificate(fleet: SecuredFleet) -> int:
     """A certificate of the fleet's own authority that ended five days ago."""
-    issue(fleet.authority, "veh-old", Role.VEHICLE, ago_days=10, days=5)
+    fleet.issue("veh-old", Role.VEHICLE, ago_days=10, days=5)
     return sessions_of(fleet, files_of(fleet.folder, "veh-old"))
 
 
 def without_role(fleet: SecuredFleet) -> int:
     """A good certificate that the register does not know reads map versions."""
-    register = fleet.authority.register_file.read_bytes()
-    issue(fleet.authority, "stranger", Role.CLIENT)
-    fleet.authority.register_file.write_bytes(register)
+    fleet.issue_unregistered("stranger")
     before = fleet.refused()
     with (
         fleet.session("services") as services,
@@ -130,8 +128,7 @@ def revoked(fleet: SecuredFleet) -> int:
     """A vehicle goes on publishing after it was revoked, in sessions old and new."""
     with fleet.session("ingest") as ingest, fleet.session("veh-a") as revoked_vehicle:
         revoked_vehicle.await_listener(OWN, SOON_S)
-        fleet.authority.revoke("veh-a")
-        comes_true(lambda: any(row["message"] == "rules changed" for row in fleet.router.logged()), within_s=SOON_S)
+        fleet.revoke("veh-a")
         before = fleet.refused()
         with fleet.session("veh-a") as again, fleet.session("veh-b") as other:
 

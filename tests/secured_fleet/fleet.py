@@ -59,7 +59,7 @@ def tls_lines(files: TlsFiles) -> str:
     )
 
 
-def comes_true(condition: Callable[[], bool], *, within_s: float = 10.0) -> bool:
+def comes_true(condition: Callable[[], bool], *, within_s: float = 30.0) -> bool:
     """Whether a condition holds now or soon: loopback takes milliseconds, the rest is a slow machine's share."""
     end_s = time.monotonic() + within_s
     while not condition():
@@ -83,12 +83,36 @@ class SecuredFleet:
         return self.fleet.folder
 
     def settings(self, name: str) -> ZenohSettings:
-        """How a name of the fleet comes to the router."""
-        return self.settings_with(files_of(self.folder, name))
+        """How a name of the fleet comes to the router, which may be busy opening its session anew."""
+        return self.settings_with(files_of(self.folder, name), timeout_s=30.0)
 
-    def settings_with(self, files: TlsFiles) -> ZenohSettings:
-        """How whoever has these files comes to the router; it tries for half a second."""
-        return ZenohSettings(mode="client", connect=(self.fleet.endpoint,), connect_timeout_s=0.5, tls=files)
+    def settings_with(self, files: TlsFiles, *, timeout_s: float = 0.5) -> ZenohSettings:
+        """How whoever has these files comes to the router; an intruder does not try for long."""
+        return ZenohSettings(mode="client", connect=(self.fleet.endpoint,), connect_timeout_s=timeout_s, tls=files)
+
+    def changes(self) -> int:
+        """How often the router's rules changed."""
+        return sum(row["message"] == "rules changed" for row in self.router.logged())
+
+    def issue(self, name: str, role: Role, *, ago_days: int = 0, days: int = DAYS) -> None:
+        """A certificate for a new name, and the router works by the rules for it."""
+        before = self.changes()
+        issue(self.authority, name, role, ago_days=ago_days, days=days)
+        assert comes_true(lambda: self.changes() > before)
+
+    def issue_unregistered(self, name: str) -> None:
+        """A good certificate for a name that the register does not have."""
+        register = self.authority.register_file.read_bytes()
+        self.issue(name, Role.CLIENT)
+        before = self.changes()
+        self.authority.register_file.write_bytes(register)
+        assert comes_true(lambda: self.changes() > before)
+
+    def revoke(self, name: str) -> None:
+        """The name revoked, and the router works by the rules without it."""
+        before = self.changes()
+        self.authority.revoke(name)
+        assert comes_true(lambda: self.changes() > before)
 
     def session(self, name: str) -> ZenohBus:
         """A name's session on the bus."""

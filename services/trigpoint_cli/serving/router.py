@@ -2,8 +2,9 @@
 
 import logging
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
+from dataclasses import dataclass, field
 
 from trigpoint.bus.refusals import Refusal, Told
 from trigpoint.bus.router import ZenohRouter
@@ -11,19 +12,29 @@ from trigpoint.observability.metrics import Instruments
 from trigpoint.observability.running import Service
 from trigpoint_cli.settings import Settings
 
-REPEAT_S = 60.0  # between two lines about the same refusal
-REPEATS_LIMIT = 1024  # different refusals remembered
+PERIOD_S = 60.0
+KINDS_LIMIT = 20  # lines about one sender in a period: one that varies its keys fills no disk
+SENDERS_LIMIT = 4096  # remembered
 
 logger = logging.getLogger(__name__)
 
 
-class RefusalLog:
-    """Refusals counted; each kind of them is logged at once, and then at most every `REPEAT_S` with their number."""
+@dataclass(slots=True)
+class _Said:
+    """What was logged of one sender since `began_s`, and how many refusals of it were not."""
 
-    def __init__(self, instruments: Instruments) -> None:
+    began_s: float
+    kinds: set[Refusal] = field(default_factory=set)
+    unsaid: int = 0
+
+
+class RefusalLog:
+    """Refusals counted; of each sender the first of a kind is logged at once, `KINDS_LIMIT` kinds each `PERIOD_S`."""
+
+    def __init__(self, instruments: Instruments, *, now_s: Callable[[], float] = time.monotonic) -> None:
         self._refused = instruments.refused_access
-        self._said_s: dict[Refusal, float] = {}
-        self._unsaid: dict[Refusal, int] = {}
+        self._now_s = now_s
+        self._senders: dict[str, _Said] = {}
 
     def hear(self, told: Told) -> None:
         """A refusal, or a remark of Zenoh's own, which is passed on."""
@@ -34,17 +45,24 @@ class RefusalLog:
             logger.log(logging.getLevelNamesMapping().get(told.level, logging.WARNING), "zenoh: %s", told.text)
 
     def _say(self, refusal: Refusal) -> None:
-        now_s = time.monotonic()
-        count = self._unsaid.pop(refusal, 0) + 1
-        if now_s - self._said_s.get(refusal, -REPEAT_S) < REPEAT_S:
-            self._unsaid[refusal] = count
+        said = self._said_of(refusal.who)
+        if refusal in said.kinds or len(said.kinds) >= KINDS_LIMIT:
+            said.unsaid += 1
             return
-        if len(self._said_s) >= REPEATS_LIMIT:
-            self._said_s.clear()
-            self._unsaid.clear()
-        self._said_s[refusal] = now_s
-        details = {"who": refusal.who, "what": refusal.what, "key": refusal.key, "count": count}
+        said.kinds.add(refusal)
+        details = {"who": refusal.who, "what": refusal.what, "key": refusal.key, "unsaid": said.unsaid}
+        said.unsaid = 0
         logger.warning("refused", extra=details)
+
+    def _said_of(self, who: str) -> _Said:
+        """What was logged of a sender in the present period."""
+        now_s, before = self._now_s(), self._senders.get(who)
+        if before is not None and now_s - before.began_s < PERIOD_S:
+            return before
+        if len(self._senders) >= SENDERS_LIMIT:
+            self._senders.clear()
+        fresh = self._senders[who] = _Said(now_s, unsaid=before.unsaid if before is not None else 0)
+        return fresh
 
 
 @contextmanager

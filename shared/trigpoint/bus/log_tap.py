@@ -28,6 +28,7 @@ class LogTap:
         sys.stdout = os.fdopen(os.dup(self._before), "w", encoding="utf-8")
         self._thread = threading.Thread(target=self._listen, args=(reading,), name="log-tap", daemon=True)
         self._thread.start()
+        os.unsetenv("NO_COLOR")  # its lines are told from forged ones by their escape characters
         zenoh.init_log_from_env_or(levels)
 
     def _listen(self, reading: int) -> None:

@@ -16,9 +16,18 @@ UNTRACED = "warn,zenoh_link_tls::unicast=debug,zenoh::net::routing::interceptor:
 NAMES_LIMIT = 4096  # sessions remembered by their certificate's name
 LINE_LIMIT = 64 * 1024  # bytes of a line that has no end yet; a longer one is dropped
 
-_COLOUR = re.compile(rb"\x1b\[[0-9;]*m")
+# A key may hold a line break and then what looks like a line; it cannot hold the escape characters of a real one.
+_DIM, _PLAIN = rb"\x1b\[2m", rb"\x1b\[0m"
 _LINE = re.compile(
-    rb"^\S+ +(?P<level>[A-Z]+) +(?:[\w-]+ +)?ThreadId\((?P<thread>\d+)\) (?P<target>[\w:]+): (?P<text>.*)$"
+    rb"^" + _DIM + rb"\S+" + _PLAIN + rb" +\x1b\[\d+m *(?P<level>[A-Z]+)" + _PLAIN + rb" +(?:[\w-]+ +)?"
+    rb"ThreadId\((?P<thread>\d+)\) "
+    + _DIM
+    + rb"(?P<target>[\w:]+)"
+    + _PLAIN
+    + _DIM
+    + rb":"
+    + _PLAIN
+    + rb" (?P<text>.*)$"
 )
 _VERDICT = re.compile(
     rb"(?:Using cached result: )?(?P<session>[0-9a-f]+) (?:on (?P<subject>.*?) )?is (?P<verdict>un)?authorized to "
@@ -68,7 +77,7 @@ class RefusalReader:
         return [one for one in told if one is not None]
 
     def _told(self, line: bytes) -> Told | None:
-        found = _LINE.match(_COLOUR.sub(b"", line))
+        found = _LINE.match(line)
         if found is None:
             return None
         level, thread, target, text = found.group("level", "thread", "target", "text")

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from secured_fleet.fleet import SecuredFleet, authority_of, comes_true, files_of, issue, message, secured_fleet
+from command_runs.processes import CLEAN
+from secured_fleet.fleet import SecuredFleet, authority_of, comes_true, files_of, message, secured_fleet
 from trigpoint.bus.ports import Subscription
 from trigpoint.bus.register import Role
 from trigpoint.bus.zenoh_bus import ZenohBus, ZenohSettings
@@ -102,10 +103,10 @@ def test_a_certificate_of_another_authority_gets_no_session(fleet: SecuredFleet,
 
 
 def test_a_certificate_past_its_end_gets_no_session(fleet: SecuredFleet) -> None:
-    issue(fleet.authority, "veh-old", Role.VEHICLE, ago_days=10, days=5)
+    fleet.issue("veh-old", Role.VEHICLE, ago_days=10, days=5)
     before = fleet.refused()
     with pytest.raises(ServiceError):
-        fleet.session("veh-old")
+        ZenohBus(fleet.settings_with(files_of(fleet.folder, "veh-old")))
     assert comes_true(lambda: fleet.refused() > before)
     assert comes_true(lambda: "certificate expired" in fleet.router.err)
 
@@ -137,9 +138,7 @@ def test_a_router_of_another_authority_is_not_trusted(fleet: SecuredFleet, tmp_p
 
 
 def test_a_name_that_is_not_in_the_register_reads_nothing_and_is_named(fleet: SecuredFleet, tmp_path: Path) -> None:
-    register = fleet.authority.register_file.read_bytes()
-    issue(fleet.authority, "stranger", Role.CLIENT)
-    fleet.authority.register_file.write_bytes(register)  # its certificate is good, and it has no role
+    fleet.issue_unregistered("stranger")
     with (
         fleet.session("services") as services,
         fleet.session("stranger") as stranger,
@@ -154,28 +153,32 @@ def test_a_name_that_is_not_in_the_register_reads_nothing_and_is_named(fleet: Se
 
 
 def test_a_revoked_name_is_heard_no_more_and_its_next_certificate_is_another(fleet: SecuredFleet) -> None:
-    issue(fleet.authority, "veh-c", Role.VEHICLE)
     own = "trigpoint/v1/veh/veh-c/up/gnss"
+    fleet.issue("veh-c", Role.VEHICLE)
+    assert _is_heard(fleet, "veh-c", own)
     with fleet.session("ingest") as ingest, fleet.session("veh-a") as other:
         heard = ingest.subscribe("trigpoint/v1/veh/*/up/*")
-        assert comes_true(lambda: _is_heard(fleet, "veh-c", own))
-        fleet.authority.revoke("veh-c")
-        assert comes_true(lambda: not _is_heard(fleet, "veh-c", own))
-        assert other.await_listener(UP_A, SOON_S)
-        other.publish(message(UP_A))
-        assert UP_A in keys_up_to(heard, UP_A)
-    issue(fleet.authority, "veh-c", Role.VEHICLE)
-    assert comes_true(lambda: _is_heard(fleet, "veh-c.2", own))
+        fleet.revoke("veh-c")
+        assert not _is_heard(fleet, "veh-c", own)
+        assert comes_true(lambda: _passes(other, heard))  # a session from before comes back by itself
+    fleet.issue("veh-c", Role.VEHICLE)
+    assert _is_heard(fleet, "veh-c.2", own)
     assert not _is_heard(fleet, "veh-c", own)
+
+
+def _passes(vehicle: ZenohBus, heard: Subscription) -> bool:
+    vehicle.await_listener(UP_A, 0.5)
+    vehicle.publish(message(UP_A))
+    return heard.receive(0.5) is not None
 
 
 def _is_heard(fleet: SecuredFleet, name: str, key: str) -> bool:
     """Whether ingest hears what the certificate's owner publishes, in sessions of their own."""
     with fleet.session("ingest") as ingest, fleet.session(name) as vehicle:
         heard = ingest.subscribe(key)
-        vehicle.await_listener(key, 0.5)
+        vehicle.await_listener(key, 3.0)
         vehicle.publish(message(key))
-        return heard.receive(0.5) is not None
+        return heard.receive(3.0) is not None
 
 
 def test_a_damaged_register_changes_no_rule_and_is_told(fleet: SecuredFleet) -> None:
@@ -192,3 +195,19 @@ def test_a_key_that_others_may_read_is_not_used(fleet: SecuredFleet, tmp_path: P
     files.key_file.chmod(0o644)
     with pytest.raises(InputError, match="mode 0644"):
         ZenohBus(fleet.settings_with(files))
+
+
+FORGED_HEAD = "2026-11-22T06:13:16.820114Z TRACE  rx-0 ThreadId(77) zenoh::net::routing::interceptor"
+FORGED = (
+    f"x\n{FORGED_HEAD}::access_control: abcdef on Interface(lo)+CertCommonName(veh-b)+x is unauthorized to Put "
+    f"(ingress) on stolen\n{FORGED_HEAD}: Msg intercepted!\nz"
+)
+
+
+def test_a_key_with_forged_log_lines_in_it_blames_nobody_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(CLEAN, "NO_COLOR", "1")
+    with secured_fleet(tmp_path / "fleet") as fleet, fleet.session("veh-a") as vehicle:
+        for forged in (FORGED, FORGED.replace("2026-", "\x1b[2m2026-")):
+            vehicle.publish(message(f"trigpoint/v1/{forged}"))
+        assert comes_true(lambda: fleet.refused() >= 2.0)
+        assert {row[0] for row in fleet.refusals()} == {"veh-a"}

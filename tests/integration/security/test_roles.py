@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from command_runs.processes import trigpoint_process
-from secured_fleet.fleet import SecuredFleet, comes_true, files_of, issue, secured_fleet
+from secured_fleet.fleet import SecuredFleet, comes_true, files_of, secured_fleet
 from trigpoint.bus.register import Role
 from trigpoint.events.observed import GnssFixReceived, ImuMeasured, VehicleDescribed
 from trigpoint_vehicle.publisher import VehiclePublisher
@@ -23,7 +23,7 @@ def fleet(tmp_path: Path) -> Iterator[SecuredFleet]:
     with secured_fleet(tmp_path / "fleet") as fleet, ExitStack() as stack:
         for service in SERVICES:
             if service != "ingest":  # there already
-                issue(fleet.authority, service, Role(service))
+                fleet.issue(service, Role(service))
             files = files_of(fleet.folder, service)
             own = ("bus.tls.certificate_file", files.certificate_file), ("bus.tls.key_file", files.key_file)
             flags = [word for key, path in own for word in ("--set", f"{key}={path}")]

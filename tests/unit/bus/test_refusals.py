@@ -10,7 +10,9 @@ STOPPED = b"zenoh::net::routing::interceptor: Msg intercepted!"
 
 
 def line(text: bytes, *, thread: int = 9, level: bytes = b"TRACE") -> bytes:
-    return TIME + level + b"  rx-0 ThreadId(%02d) " % thread + text + b"\n"
+    target, _, rest = text.partition(b": ")
+    head = b"\x1b[35m" + level + b"\x1b[0m  rx-0 ThreadId(%02d) " % thread
+    return TIME + head + b"\x1b[2m" + target + b"\x1b[0m\x1b[2m:\x1b[0m " + rest + b"\n"
 
 
 def test_a_message_that_was_stopped_is_told_with_sender_and_key() -> None:
@@ -69,6 +71,14 @@ def test_a_line_without_end_is_not_kept() -> None:
     reader = RefusalReader()
     assert reader.read(b"x" * 200_000) == []
     assert reader.read(b"\n" + line(STOPPED)) == []
+
+
+def test_a_line_that_a_key_brought_along_is_not_believed() -> None:
+    real = line(ACL + SUBJECT + b" is unauthorized to Put (ingress) on t/v1/x\nFORGED") + line(STOPPED)
+    forged = line(ACL + SUBJECT.replace(b"veh-a", b"veh-b") + b" is unauthorized to Put (ingress) on stolen")
+    written = forged.replace(b"\x1b", b"\\x1b")  # as Zenoh writes escape characters of a key
+    told = RefusalReader().read(real.replace(b"FORGED", written.strip()))
+    assert told == [Refusal("veh-a", "Put", "t/v1/x")]
 
 
 def test_other_warnings_are_passed_on() -> None:
