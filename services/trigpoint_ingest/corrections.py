@@ -20,13 +20,15 @@ CORRECTING_SOURCE = "corrections"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Attribution:
-    """Who corrects, when and why. Raises InputError for a text over TEXT_LIMIT characters."""
+    """Who corrects, when and why. Raises InputError for nobody, and for a text over TEXT_LIMIT characters."""
 
     author: str
     reason: str
     stamp_ns: int
 
     def __post_init__(self) -> None:
+        if not self.author.strip():
+            raise InputError(f"author {self.author!r}: a correction needs somebody who says so")
         for name, text in (("author", self.author), ("reason", self.reason)):
             if len(text) > TEXT_LIMIT:
                 raise InputError(f"{name} of {len(text)} characters, limit {TEXT_LIMIT}")

@@ -132,6 +132,11 @@ def test_a_list_says_which_anchors_hold_and_why_not() -> None:
     assert (held.retracted, gone.retracted and gone.retracted.author) == (None, "surveyor")
 
 
+def test_a_correction_by_nobody_is_refused() -> None:
+    with pytest.raises(InputError, match="author ' ': a correction needs somebody"):
+        Attribution(author=" ", reason="", stamp_ns=0)
+
+
 def test_a_reason_too_long_for_a_name_is_refused_with_the_limit() -> None:
     with pytest.raises(InputError, match="reason of 201 characters, limit 200"):
         Attribution(author="surveyor", reason="x" * 201, stamp_ns=0)
