@@ -1,6 +1,5 @@
 """`trigpoint log`: what log files hold, whether they are whole, and how they stay so."""
 
-from datetime import UTC, datetime
 from pathlib import Path
 
 import click
@@ -9,9 +8,7 @@ from trigpoint.logs.findings import FileSummary, Finding
 from trigpoint.logs.verification import Verification, verify
 from trigpoint_cli.data_dir import LOG_NAME
 from trigpoint_cli.log_keeping import recover_command, retain_command, seal_command
-from trigpoint_cli.output import Answer, JsonObject, Screen, answering
-
-NS_PER_S = 1e9
+from trigpoint_cli.output import Answer, JsonObject, Screen, answering, utc
 
 
 @click.group("log", help="What log files hold, whether they are whole, and how they stay so.")
@@ -56,10 +53,6 @@ def _line(finding: Finding) -> str:
     return f"{finding.path}, byte {finding.offset}: {finding.kind}: {finding.detail}"
 
 
-def _utc(stamp_ns: int) -> str:
-    return datetime.fromtimestamp(stamp_ns / NS_PER_S, tz=UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-
-
 @command.command("info")
 @click.argument("path", metavar="DIR", type=click.Path(path_type=Path))
 @answering
@@ -68,8 +61,8 @@ def info(path: Path, *, screen: Screen) -> Answer:
     found = _verified(path)
     count = sum(file.count for file in found.files)
     lines = [
-        f"{file.stream}: {file.count} events, {file.size_bytes / 1e6:.1f} MB, {_utc(file.start_ns)} to "
-        f"{_utc(file.end_ns)}, {', '.join(sorted({topic.schema_name for topic in file.topics}))}"
+        f"{file.stream}: {file.count} events, {file.size_bytes / 1e6:.1f} MB, {utc(file.start_ns)} to "
+        f"{utc(file.end_ns)}, {', '.join(sorted({topic.schema_name for topic in file.topics}))}"
         for file in found.files
     ]
     values = {
