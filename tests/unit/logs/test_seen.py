@@ -45,3 +45,17 @@ def test_ranges_ascend_and_never_touch(sequences: list[int]) -> None:
         seen.add(_van(sequence))
     bounds = [bound for both in seen.ranges("van", "boot-1") for bound in both]
     assert bounds == sorted(set(bounds))
+
+
+@given(st.lists(st.tuples(st.integers(0, 40), st.integers(1, 10))), st.integers(0, 50), st.integers(1, 10))
+@settings(max_examples=200, deadline=None, derandomize=True)
+def test_ranges_added_are_as_their_numbers_added(added: list[tuple[int, int]], start: int, count: int) -> None:
+    seen, one_by_one = SeenSequences(), SeenSequences()
+    for first, length in added:
+        seen.add_range("van", "boot-1", start=first, stop=first + length)
+        for sequence in range(first, first + length):
+            one_by_one.add(_van(sequence))
+    asked = [_van(sequence) in one_by_one for sequence in range(start, start + count)]
+    assert seen.ranges("van", "boot-1") == one_by_one.ranges("van", "boot-1")
+    assert seen.covers("van", "boot-1", start=start, stop=start + count) == all(asked)
+    assert seen.overlaps("van", "boot-1", start=start, stop=start + count) == any(asked)
