@@ -5,6 +5,7 @@ from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from landmark_maps import examples
@@ -275,3 +276,82 @@ def test_one_name_in_two_images_is_two_anchors(store: LandmarkStore) -> None:
         ("tile-1", "L1"),
         ("tile-2", ""),
     ]
+
+
+@pytest.fixture
+def applied_at_once(store: LandmarkStore) -> LandmarkStore:
+    """The versions of `moved`, in one transaction."""
+    a, b, c = landmark("A", 0.0, 0.0), landmark("B", 100.0, 0.0), landmark("C", 0.0, 100.0, kind="corner")
+    versions = (
+        change(1, opened=[a, b]),
+        change(2, opened=[landmark("B", 101.0, 0.0), c], closed=["B"]),
+        change(3, closed=["A"]),
+    )
+    store.apply_all(versions, checkpoint(30))
+    return store
+
+
+def test_versions_applied_at_once_are_as_if_applied_one_by_one(applied_at_once: LandmarkStore) -> None:
+    one_by_one = MemoryStore()
+    one_by_one.apply(change(1, opened=[landmark("A", 0.0, 0.0), landmark("B", 100.0, 0.0)]), checkpoint(10))
+    moved_b, c = landmark("B", 101.0, 0.0), landmark("C", 0.0, 100.0, kind="corner")
+    one_by_one.apply(change(2, opened=[moved_b, c], closed=["B"]), checkpoint(20))
+    one_by_one.apply(change(3, closed=["A"]), checkpoint(30))
+    assert set(applied_at_once.rows()) == set(one_by_one.rows())
+    assert applied_at_once.checkpoint() == one_by_one.checkpoint()
+
+
+@pytest.mark.parametrize("as_of", [1, 2, 3])
+def test_every_version_applied_at_once_can_be_asked_for(applied_at_once: LandmarkStore, as_of: int) -> None:
+    expected = {1: ["A", "B"], 2: ["A", "B", "C"], 3: ["B", "C"]}
+    assert ids(applied_at_once.landmarks(LandmarkQuery(as_of=as_of))) == expected[as_of]
+
+
+def test_of_versions_applied_at_once_all_or_none_are_there(moved: LandmarkStore) -> None:
+    before = set(moved.rows())
+    with pytest.raises(InputError, match="closes 1 landmarks: 0 are valid"):
+        moved.apply_all((change(4, opened=[landmark("D", 0.0, 0.0)]), change(5, closed=["A"])), checkpoint(50))
+    assert (set(moved.rows()), moved.checkpoint()) == (before, checkpoint(30))
+
+
+def test_answers_are_the_same_while_indexes_are_put_off(moved: LandmarkStore) -> None:
+    moved.defer_indexes()
+    assert ids(moved.landmarks(LandmarkQuery(bbox=box_of(50.0, -20.0, 150.0, 20.0)))) == ["B"]
+    moved.restore_indexes()
+    assert ids(moved.landmarks(LandmarkQuery(bbox=box_of(50.0, -20.0, 150.0, 20.0)))) == ["B"]
+
+
+def test_a_sound_store_has_no_damage(moved: LandmarkStore) -> None:
+    assert moved.damage() == ()
+
+
+@pytest.fixture
+def crowd(store: LandmarkStore) -> tuple[LandmarkStore, MemoryStore]:
+    """300 landmarks at random on 2 km, a third of them moved in version 2; and the same in memory."""
+    at_m = np.random.default_rng(5).uniform(-1000.0, 1000.0, (400, 2)).tolist()
+    rows = [landmark(f"L{n}", *at_m[n], kind=("pole", "corner")[n % 2]) for n in range(300)]
+    again = [landmark(f"L{3 * n}", *at_m[300 + n]) for n in range(100)]
+    twin = MemoryStore()
+    for one in (store, twin):
+        one.apply(change(1, opened=rows), checkpoint(1))
+        one.apply(change(2, opened=again, closed=[row.landmark for row in again]), checkpoint(2))
+    return store, twin
+
+
+@pytest.mark.parametrize("as_of", [None, 1])
+@pytest.mark.parametrize("kind", [None, "corner"])
+@pytest.mark.parametrize("limit", [None, 7])
+@pytest.mark.parametrize("area", ["bbox", "near", "both"])
+def test_every_store_answers_as_memory_does(
+    crowd: tuple[LandmarkStore, MemoryStore], as_of: int | None, kind: str | None, limit: int | None, area: str
+) -> None:
+    here = landmark("here", 123.0, -45.0)
+    query = LandmarkQuery(
+        bbox=None if area == "near" else box_of(-300.0, -400.0, 500.0, 600.0),
+        near=None if area == "bbox" else Disc(lat_deg=here.lat_deg, lon_deg=here.lon_deg, radius_m=350.0),
+        kind=kind,
+        as_of=as_of,
+        limit=limit,
+    )
+    store, twin = crowd
+    assert store.landmarks(query) == twin.landmarks(query) != ()

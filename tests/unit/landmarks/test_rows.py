@@ -145,3 +145,34 @@ def test_one_name_in_two_images_is_two_anchors() -> None:
 
 def test_an_empty_map_has_no_rows() -> None:
     assert changed(1, []).opened == ()
+
+
+def delta(map_version: int, landmarks: list[LandmarkSolved], *, removed: tuple[str, ...], held: MapChange) -> MapChange:
+    """The change of a version that says only what differs from the one before."""
+    head = replace(closing(map_version, 0), base_version=map_version - 1, removed=removed)
+    events: list[Mapped] = [*landmarks, head]
+    rows = [
+        (LogPosition(MAP_STREAM, number), Envelope(EventIdentity("optimisation", "boot-1", number), START_NS, event))
+        for number, event in enumerate(events)
+    ]
+    (version,) = solved_versions(rows)
+    return map_change(version, frame=frame(), labels={}, valid=valid_with(held))
+
+
+def test_a_version_that_says_what_changed_closes_and_opens_nothing_else() -> None:
+    first = changed(1, [solved_landmark(f"L{n}", 9.0 * n, 0.0) for n in range(4)])
+    second = delta(2, [solved_landmark("L1", 10.0, 0.0, map_version=2)], removed=("L3",), held=first)
+    assert ([row.landmark for row in second.opened], second.closed) == (["L1"], ("L1", "L3"))
+    assert list(valid_with(first, second)) == ["L0", "L2", "L1"]
+
+
+def test_a_landmark_said_again_just_as_it_was_keeps_its_row() -> None:
+    first = changed(1, [solved_landmark("L1", 1.0, 0.0)])
+    second = delta(2, [solved_landmark("L1", 1.0, 0.0, map_version=2)], removed=(), held=first)
+    assert (second.opened, second.closed) == ((), ())
+
+
+def test_a_landmark_both_named_and_removed_is_removed() -> None:
+    first = changed(1, [solved_landmark("L1", 1.0, 0.0)])
+    second = delta(2, [solved_landmark("L1", 2.0, 0.0, map_version=2)], removed=("L1", "never there"), held=first)
+    assert (second.opened, second.closed) == ((), ("L1",))

@@ -1,6 +1,7 @@
 """Which events make a map version."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -78,3 +79,32 @@ def test_an_empty_map_is_a_version() -> None:
 def test_arrays_are_taken_as_they_are() -> None:
     (version,) = versions(logged(solved_map(1, [solved_landmark("L1", 0.1, 0.2)])))
     assert np.array_equal(version.landmarks[0].position_m, [0.1, 0.2])
+
+
+def changing(
+    map_version: int, base_version: int, landmark_count: int, *, removed: tuple[str, ...] = ()
+) -> SolvedVersion:
+    """A version that names L1 as changed."""
+    head = replace(closing(map_version, landmark_count), base_version=base_version, removed=removed)
+    (version,) = versions(logged([solved_landmark("L1", 0.0, 0.0, map_version=map_version), head]))
+    return version
+
+
+def test_a_change_of_the_newest_version_is_taken() -> None:
+    assert refusal_of(changing(4, 3, 2), newest=3, valid=("L1", "L2")) == ""
+
+
+def test_a_change_counts_what_comes_and_what_goes() -> None:
+    assert refusal_of(changing(4, 3, 2, removed=("L2",)), newest=3, valid=("L2", "L3")) == ""
+    wrong = refusal_of(changing(4, 3, 3, removed=("L2",)), newest=3, valid=("L2", "L3"))
+    assert wrong == "MapSolved counts 3 landmarks: 2 are in the log"
+
+
+def test_a_change_of_a_version_that_is_not_held_is_refused_with_both() -> None:
+    reason = refusal_of(changing(4, 2, 1), newest=3, valid=("L1",))
+    assert reason == "map version 4 is a change of 2: 3 is held"
+
+
+def test_a_name_no_database_keeps_refuses_its_version() -> None:
+    (version,) = versions(logged(solved_map(1, [solved_landmark("L\0", 0.0, 0.0)])))
+    assert "U+0000" in refusal_of(version, newest=0, valid=())
