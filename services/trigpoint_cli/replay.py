@@ -19,13 +19,15 @@ LISTED = 20  # differences said in full
 def command(data: DataDirectory, restore: bool, *, screen: Screen) -> Answer:
     """Rebuild every projection from the log and say whether anything differs (then status 2)."""
     with data.opened_log() as log:
+        begins = {stream: log.begins_at(stream) for stream in log.streams() if log.begins_at(stream) > 0}
         restored = _restored(data, log, screen) if restore else ()
         with data.opened_database(read_only=True) as held, screen.part_of("replaying") as progress:
             found = replay_difference(log, held, progress=progress)
     said = [{"table": one.table, "key": one.key, "detail": one.detail} for one in found[:LISTED]]
     complaints = tuple(f"{one['table']} {one['key']}: {one['detail']}" for one in said)
-    values = {"restored_versions": list(restored), "differences": len(found), "listed": said}
-    lines = (f"{len(restored)} map versions restored",) if restored else ()
+    values = {"restored_versions": list(restored), "differences": len(found), "listed": said, "begins_at": begins}
+    late = (f"{stream}: the log begins at number {number}, not at 0" for stream, number in begins.items())
+    lines = (*late, *((f"{len(restored)} map versions restored",) if restored else ()))
     return Answer(values, lines if found else (*lines, "no difference"), complaints)
 
 

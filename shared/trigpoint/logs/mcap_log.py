@@ -201,7 +201,7 @@ class McapLog:
         return known
 
     def streams(self) -> tuple[str, ...]:
-        """The names of all streams that hold an event, sorted."""
+        """The names of all streams that hold an event, or held one that is recorded as gone, sorted."""
         return renewed_once(self._streams)
 
     def next_number(self, stream: str) -> int:
@@ -290,8 +290,10 @@ class McapLog:
         return renewed_once(answered)
 
     def _streams(self) -> tuple[str, ...]:
-        self._bring_all_up_to_date()
-        return self._catalog.streams()
+        there = self._bring_all_up_to_date()
+        held = set(self._catalog.streams())
+        emptied = {stream for stream in there - held if (self.directory / stream / ABSENCES_NAME).exists()}
+        return tuple(sorted(held | emptied))
 
     def _bring_up_to_date(self, stream: str) -> None:
         """The catalog knows the stream's files: looked at again only where one came, went, or the last one grew."""
@@ -310,10 +312,12 @@ class McapLog:
             return None
         return (last.first_number, changed_ns) if last and size_bytes == last.size_bytes else None
 
-    def _bring_all_up_to_date(self) -> None:
+    def _bring_all_up_to_date(self) -> set[str]:
+        """The streams that have a folder; the catalog knows all their files."""
         there = {path.name for path in self.directory.iterdir() if path.is_dir() and not path.name.startswith(".")}
         for stream in sorted(there | set(self._catalog.streams())):
             self._bring_up_to_date(stream)
+        return there
 
 
 def _damages(files: Sequence[CatalogFile], number: int) -> dict[int, str]:

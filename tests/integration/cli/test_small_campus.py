@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 
 from command_runs.running import Run, trigpoint
 from command_runs.small_campus import LABELS, write_small_campus
+from trigpoint.logs.mcap_log import McapLog
 from trigpoint_vehicle.app import Written
 
 ERROR_KEYS = {"count", "mean", "median", "rmse", "p95", "max"}
@@ -241,3 +243,14 @@ def test_without_anchors_the_map_is_loose(campus: BuiltCampus, tmp_path: Path) -
     assert said.status == 2
     assert "no anchor" in said.answer["error"]
     assert trigpoint("build", "--data", tmp_path, "--json").answer["method"] == "loose"
+
+
+def test_replay_says_plainly_that_a_shortened_log_does_not_begin_at_0(campus: BuiltCampus, tmp_path: Path) -> None:
+    data = shutil.copytree(campus.data, tmp_path / "data")
+    stream = "veh-vehicle-1"
+    with closing(McapLog(data / "log")) as log:
+        count = log.next_number(stream)
+    trigpoint("log", "seal", data)
+    trigpoint("log", "retain", data, "--keep-bytes", 0, "--passed", f"all:{stream}={count}", "--also-inputs")
+    assert f"{stream}: the log begins at number {count}, not at 0" in trigpoint("replay", "--data", data).out
+    assert trigpoint("replay", "--data", data, "--json").answer["differences"] == 0

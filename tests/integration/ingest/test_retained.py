@@ -19,14 +19,14 @@ from trigpoint_ingest.settings import IngestSettings
 STREAM = "veh-van"
 
 
-@pytest.fixture
-def admission(tmp_path: Path) -> Admission:
-    """What is recalled of 300 events of which the first 200 were retained away."""
+@pytest.fixture(params=[200, 300], ids=["some", "all"])
+def admission(tmp_path: Path, request: pytest.FixtureRequest) -> Admission:
+    """What is recalled of 300 events of which the first 200, or all, were retained away."""
     with closing(McapLog(tmp_path, rotation=Rotation(span_ns=99 * STEP_NS, span_least_bytes=0))) as log:
         for first in range(0, 300, 50):
             log.append(STREAM, imu_rows(first, first + 50))
         seal_finished(tmp_path / STREAM)
-        held = obstacles(log, {"reader": {STREAM: 200}}, also_inputs=False)
+        held = obstacles(log, {"reader": {STREAM: request.param}}, also_inputs=False)
         remove_files(tmp_path, planned_retention(log_files(log), held, Keeping(total_bytes=0)).removed)
         return admission_from(log, IngestSettings())
 
