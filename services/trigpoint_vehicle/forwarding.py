@@ -12,12 +12,15 @@ from trigpoint.events.codec import schema_version
 from trigpoint.events.envelope import EventIdentity
 from trigpoint.events.runs import EncodedRun
 from trigpoint.events.uplink import acknowledgement_key, uplink_key
+from trigpoint_vehicle.core.bridging import bridge
 from trigpoint_vehicle.core.outgoing import Outgoing, SendChannel
 from trigpoint_vehicle.core.patience import Patience, after_progress, after_sending, after_silence, patience
+from trigpoint_vehicle.core.spool_walk import DESCRIPTION_SCHEMA
 from trigpoint_vehicle.core.under_way import UnderWay
 from trigpoint_vehicle.settings import VehicleSettings
 
 LOOK_S = 0.05  # between two looks whether anybody listens
+BRIDGE_AFTER_TRIES = 3  # some 7 s: until then an acknowledgement may just be an old one
 TRUSTED_S = 5.0  # so long after an acknowledgement somebody listens, whatever the bus knows of it
 
 UNKNOWN_VERSION = 1  # of a schema nobody here knows: its bytes go as they are
@@ -56,6 +59,9 @@ class Forwarder:
         self._patience: Patience = patience(first_s=settings.ack_timeout_s, longest_s=settings.ack_timeout_max_s)
         self._heard_s = self._looked_s = -float("inf")
         self._is_heard = False
+        self._said: EventIdentity | None = None  # the last acknowledgement heard
+        self._bridged: EventIdentity | None = None  # up to where the receiver was told what is gone
+        self._descriptions: dict[str, Outgoing] = {}
         self.sent = 0
         self.acknowledged = 0
 
@@ -117,7 +123,10 @@ class Forwarder:
         self._look(self._bus, now_s)
         if self._patience.is_over(now_s):
             self._send_again(now_s)
+            self._bridge(self._bus)
             return self._send(self._bus)
+        if self._bridged is not None and self._bridged == self._said:
+            self._bridge(self._bus)
         return self._may_send(now_s) and self._send(self._bus)
 
     def _hear(self, wait_s: float) -> None:
@@ -128,6 +137,7 @@ class Forwarder:
         while acknowledgement is not None:
             if acknowledgement.identity.source == self._vehicle:
                 self._heard_s = self._now_s()
+                self._said = acknowledgement.identity
                 done += self._under_way.accept(acknowledgement.identity)
             acknowledgement = self._acknowledgements.receive(0.0)
         if done:
@@ -141,6 +151,8 @@ class Forwarder:
         if count and not under_way.unsent:
             for message in self._source.read(count=count, size_bytes=under_way.room_bytes):
                 under_way.add(message)
+                if message.channel.schema_name == DESCRIPTION_SCHEMA:
+                    self._descriptions.setdefault(message.channel.boot_id, message)
 
     def _look(self, bus: Bus, now_s: float) -> None:
         """Whether anybody listens; where somebody does again, what was sent meanwhile is sent again."""
@@ -160,18 +172,33 @@ class Forwarder:
         count = self._under_way.send_again()
         logger.info("%s: %d messages are sent again from %s", self._vehicle, count, self.oldest)
 
+    def _bridge(self, bus: Bus) -> None:
+        """What the receiver had acknowledged and has lost since is told to be gone, after enough tries in vain."""
+        if self._patience.tries < BRIDGE_AFTER_TRIES or not self._under_way.awaiting:
+            return
+        missing = bridge(self._said, self._under_way.oldest, self._descriptions, key=self._listener_key)
+        if missing:
+            last = missing[-1]
+            self._bridged = EventIdentity(last.channel.source, last.channel.boot_id, last.sequence)
+            logger.error("%s: %s to %d were acknowledged and are missing now", self._vehicle, self._said, last.sequence)
+            _publish(bus, missing)
+
     def _send(self, bus: Bus) -> bool:
         settings = self._settings
         messages = self._under_way.to_send(count=settings.together_count, size_bytes=settings.together_bytes)
-        groups: dict[SendChannel, list[Outgoing]] = {}
-        for message in messages:
-            groups.setdefault(message.channel, []).append(message)
-        for channel, group in groups.items():
-            bus.publish_run(_run(channel, group))
+        _publish(bus, messages)
         if messages:
             self.sent += len(messages)
             self._patience = after_sending(self._patience, now_s=self._now_s())
         return bool(messages)
+
+
+def _publish(bus: Bus, messages: Sequence[Outgoing]) -> None:
+    groups: dict[SendChannel, list[Outgoing]] = {}
+    for message in messages:
+        groups.setdefault(message.channel, []).append(message)
+    for channel, group in groups.items():
+        bus.publish_run(_run(channel, group))
 
 
 def _run(channel: SendChannel, messages: Sequence[Outgoing]) -> BusRun:

@@ -75,3 +75,23 @@ def test_ingest_that_comes_after_a_restart_gets_both_boots_whole_and_in_order(tm
     found = [(one.identity.boot_id, one.identity.sequence) for one in stored(log, "veh-veh-a")]
     log.close()
     assert found == [(boot, number) for boot in (first.boot_id, second.boot_id) for number in range(500)]
+
+
+def test_a_receiver_that_lost_what_it_acknowledged_gets_the_description_and_all_that_is_left(tmp_path: Path) -> None:
+    exchange = MemoryExchange()
+    log, emptied = McapLog(tmp_path / "log"), McapLog(tmp_path / "emptied")
+    hasty = replace(SMALL, ack_timeout_s=0.05, ack_timeout_max_s=0.1)
+    with MemoryBus(exchange) as bus, VehiclePublisher("veh-a", tmp_path / "spool", bus, hasty) as publisher:
+        with ingesting(log, exchange):
+            drive(publisher, 50)
+            assert publisher.flush(SOON_S)
+        event = ImuMeasured(yaw_rate_radps=0.0, acceleration_x_mps2=1.0, acceleration_y_mps2=0.0)
+        last = publisher.send(event, stamp_ns=START_NS + 50 * STEP_NS)
+        with ingesting(emptied, exchange):
+            assert publisher.flush(SOON_S)
+    found = [one.identity.sequence for one in stored(emptied, "veh-veh-a")]
+    refused = stored(emptied, "refused")
+    log.close()
+    emptied.close()
+    assert found == [0, last.sequence]
+    assert len(refused) == 49
