@@ -109,7 +109,8 @@ class ZenohRouter:
         """The session ended; again: no effect."""
         if not self._closed:
             self._closed = True
-            self._session.close()  # type: ignore[no-untyped-call]
+            if not self._session.is_closed():  # it is, where it could not be opened anew
+                self._session.close()  # type: ignore[no-untyped-call]
             self._tap.close()
 
     def _access_now(self) -> dict[str, Any] | None:

@@ -6,9 +6,11 @@ cryptography's one home.
 """
 
 import datetime
+import fcntl
 import os
 import secrets
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from ipaddress import ip_address
 from pathlib import Path
@@ -30,7 +32,7 @@ from trigpoint.errors import InputError
 from trigpoint.events.keys import valid_name
 
 KEY_NAME, ISSUED_NAME, PUBLIC_NAME = "authority.key", "issued", "public"
-CERTIFICATE_NAME = "authority.pem"
+CERTIFICATE_NAME, LOCK_NAME = "authority.pem", ".lock"
 AUTHORITY_DAYS = 3650
 DAYS_LIMIT = 825  # of an issued certificate: what is stolen unnoticed ends some day
 CLOCK_SLACK_S = 300  # a certificate is valid this long before it was made: clocks differ
@@ -78,38 +80,52 @@ class Authority:
 
         Raises InputError for a name, lifetime or alternative that cannot be.
         """
-        register = self.register()
-        common_name = register.next_common_name(name, role)
         if not 1 <= days <= DAYS_LIMIT:
             raise InputError(f"{days} days: 1 to {DAYS_LIMIT} are allowed")
         if role is Role.ROUTER and not alternatives:
             raise InputError("a router needs the names or addresses it is reached under: give at least one")
         not_after_s = min(now_s + days * 86_400, self.not_after_s)
         key = Ed25519PrivateKey.generate()
-        certificate = self._signed(key, common_name, (now_s, not_after_s), alternatives, passphrase)
+        with self._locked():
+            register = self.register()
+            common_name = register.next_common_name(name, role)
+            certificate = self._signed(key, common_name, (now_s, not_after_s), alternatives, passphrase)
+            row = Registration(
+                name=name,
+                common_name=common_name,
+                role=role,
+                serial=f"{certificate.serial_number:x}",
+                not_after_s=not_after_s,
+            )
+            files = self._written(key, certificate, common_name)
+            write_register(self.register_file, register.with_issued(row))
+        return Issued(row, *files)
+
+    def _written(self, key: Ed25519PrivateKey, certificate: x509.Certificate, common_name: str) -> tuple[Path, Path]:
+        """The files of a certificate and its key."""
         issued = self._folder / ISSUED_NAME
         issued.mkdir(mode=0o700, exist_ok=True)
         files = issued / f"{common_name}.pem", issued / f"{common_name}.key"
-        row = Registration(
-            name=name,
-            common_name=common_name,
-            role=role,
-            serial=f"{certificate.serial_number:x}",
-            not_after_s=not_after_s,
-        )
         _write_key(files[1], key, NoEncryption())  # Zenoh reads no encrypted ones
         _write(files[0], certificate.public_bytes(Encoding.PEM), mode=0o644)
-        write_register(self.register_file, register.with_issued(row))
-        return Issued(row, *files)
+        return files
 
     def revoke(self, name: str) -> Register:
         """The register without access for a name; its certificates and keys stay where they are.
 
         Raises InputError for a name without a certificate in force.
         """
-        register = self.register().with_revoked(name)
-        write_register(self.register_file, register)
+        with self._locked():
+            register = self.register().with_revoked(name)
+            write_register(self.register_file, register)
         return register
+
+    @contextmanager
+    def _locked(self) -> Iterator[None]:
+        """Nobody else changes the register: what one wrote, another does not overwrite."""
+        with (self._folder / LOCK_NAME).open("w") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            yield
 
     def _signed(
         self,

@@ -2,13 +2,14 @@
 
 import socket
 import ssl
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from command_runs.processes import CLEAN
-from secured_fleet.fleet import SecuredFleet, authority_of, comes_true, files_of, message, secured_fleet
+from secured_fleet.fleet import DAY_S, SecuredFleet, authority_of, comes_true, files_of, message, secured_fleet
 from trigpoint.bus.ports import Subscription
 from trigpoint.bus.register import Role
 from trigpoint.bus.zenoh_bus import ZenohBus, ZenohSettings
@@ -111,6 +112,19 @@ def test_a_certificate_past_its_end_gets_no_session(fleet: SecuredFleet) -> None
     assert comes_true(lambda: "certificate expired" in fleet.router.err)
 
 
+def test_a_session_ends_with_its_certificate(fleet: SecuredFleet) -> None:
+    lifetime_s = 10  # most of it for a slow machine to connect in
+    before = fleet.changes()
+    began_s = int(time.time()) + lifetime_s - DAY_S
+    fleet.authority.issue("veh-brief", Role.VEHICLE, now_s=began_s, days=1, alternatives=(), passphrase=None)
+    assert comes_true(lambda: fleet.changes() > before)
+    key = "trigpoint/v1/veh/veh-brief/up/gnss"
+    with fleet.session("ingest") as ingest, fleet.session("veh-brief") as vehicle:
+        heard = ingest.subscribe(key)
+        assert comes_true(lambda: _passes(vehicle, heard, key), within_s=lifetime_s)
+        assert comes_true(lambda: not _passes(vehicle, heard, key))
+
+
 def test_whoever_speaks_no_tls_gets_no_session(fleet: SecuredFleet) -> None:
     plain = fleet.fleet.endpoint.replace("tls/", "tcp/")
     with pytest.raises(ServiceError):
@@ -166,9 +180,9 @@ def test_a_revoked_name_is_heard_no_more_and_its_next_certificate_is_another(fle
     assert not _is_heard(fleet, "veh-c", own)
 
 
-def _passes(vehicle: ZenohBus, heard: Subscription) -> bool:
-    vehicle.await_listener(UP_A, 0.5)
-    vehicle.publish(message(UP_A))
+def _passes(vehicle: ZenohBus, heard: Subscription, key: str = UP_A) -> bool:
+    vehicle.await_listener(key, 0.5)
+    vehicle.publish(message(key))
     return heard.receive(0.5) is not None
 
 

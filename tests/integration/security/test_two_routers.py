@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+
 from command_runs.processes import Process, free_ports, trigpoint_process
 from secured_fleet.fleet import SecuredFleet, comes_true, files_of, message, secured_fleet
-
 from trigpoint.bus.register import Role
 from trigpoint.bus.zenoh_bus import ZenohBus
 

@@ -1,6 +1,8 @@
 """`trigpoint certs`: what the authority hands out, and what it does not."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -108,3 +110,17 @@ def test_the_register_holds_no_key(authority: Path) -> None:
         "not_after_s",
         "revoked",
     }
+
+
+def test_certificates_issued_at_once_are_all_registered_and_no_revocation_is_lost(authority: Path) -> None:
+    issued(authority, "veh-lost", "--role", "vehicle")
+    words = [("issue", f"veh-{number}", "--role", "vehicle") for number in range(8)]
+    commands = [*words[:4], ("revoke", "veh-lost"), *words[4:]]
+    started = [
+        subprocess.Popen([sys.executable, "-m", "trigpoint_cli", "certs", *command, "--authority", str(authority)])
+        for command in commands
+    ]
+    assert [one.wait() for one in started] == [0] * 9
+    listed = trigpoint("certs", "list", "--authority", authority, "--json").answer["certificates"]
+    states = {row["name"]: row["state"] for row in listed}
+    assert states == {"veh-lost": "revoked", **{f"veh-{number}": "in force" for number in range(8)}}
