@@ -3,6 +3,7 @@
 Importing this loads what a vehicle needs: Zenoh, Protobuf, numpy. No factor graph, no database, no projections.
 """
 
+import atexit
 import logging
 import secrets
 import threading
@@ -105,6 +106,7 @@ class VehiclePublisher:
         )
         for thread in self._threads:
             thread.start()
+        atexit.register(self.close)  # an open session would hang the interpreter's exit
 
     def describe(self, event: VehicleDescribed, *, stamp_ns: int) -> EventIdentity:
         """The identity of the description, the first event of a boot; raises as `send` does."""
@@ -128,9 +130,10 @@ class VehiclePublisher:
         if type(event) not in OBSERVED:
             raise InputError(f"{type(event).__name__} is not what a vehicle sends")
         schema_name, payload = encode(event)
-        self._require(payload)
+        self._require_fitting(payload)
         channel = self._channel(self.boot_id, schema_name)
         with self._mutex:
+            self._require_open()
             sequence = self._next_sequence
             self._spool.append(channel, sequence, stamp_ns, payload)
             self._next_sequence = sequence + 1
@@ -145,9 +148,10 @@ class VehiclePublisher:
         identity = message.identity
         if identity.source != self.vehicle:
             raise InputError(f"{identity} is not of vehicle {self.vehicle!r}")
-        self._require(message.payload)
+        self._require_fitting(message.payload)
         channel = self._channel(identity.boot_id, message.schema_name)
         with self._mutex:
+            self._require_open()
             self._spool.append(channel, identity.sequence, message.stamp_ns, message.payload)
         self._wake_up()
 
@@ -162,11 +166,13 @@ class VehiclePublisher:
         if not self._unsynced.is_set():
             self._unsynced.set()
 
-    def _require(self, payload: bytes) -> None:
+    def _require_open(self) -> None:
         if self._failure is not None:
             raise ServiceError(f"the publisher of {self.vehicle!r} has failed: {self._failure}") from self._failure
         if self._stop.is_set():
             raise ServiceError(f"the publisher of {self.vehicle!r} is closed")
+
+    def _require_fitting(self, payload: bytes) -> None:
         limit = self._settings.message_limit_bytes
         if len(payload) > limit:
             raise EventRejected("too large", f"payload of {len(payload)} bytes, limit {limit}")
@@ -201,6 +207,7 @@ class VehiclePublisher:
         """What is not acknowledged stays in the spool, durable, for the next boot; again: no effect."""
         if self._stop.is_set():
             return
+        atexit.unregister(self.close)
         self._stop.set()
         self._unsynced.set()
         self._wake.set()

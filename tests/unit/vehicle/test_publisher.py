@@ -277,6 +277,20 @@ def test_closing_ends_the_thread(opened: Opening) -> None:
     assert [thread.name for thread in threading.enumerate() if thread.name.startswith("publisher")] == []
 
 
+def test_a_program_that_does_not_close_its_publisher_ends_all_the_same(tmp_path: Path) -> None:
+    code = (
+        "import pathlib, sys\n"
+        "from trigpoint.bus.zenoh_bus import ZenohSettings\n"
+        "from trigpoint.events.observed import VehicleDescribed\n"
+        "from trigpoint_vehicle.publisher import VehiclePublisher\n"
+        "publisher = VehiclePublisher('veh-a', pathlib.Path(sys.argv[1]), ZenohSettings())\n"
+        "publisher.describe(VehicleDescribed(vehicle='veh-a'), stamp_ns=1)\n"
+    )
+    subprocess.run([sys.executable, "-c", code, str(tmp_path)], check=True, timeout=60.0)
+    with MemoryBus() as bus, VehiclePublisher("veh-a", tmp_path, bus) as again:
+        assert again.behind.messages == 1
+
+
 def test_importing_the_publisher_loads_no_library_of_the_servers() -> None:
     code = (
         "import sys, trigpoint_vehicle.publisher\n"
