@@ -98,12 +98,6 @@ class GeoPackageStore:
             found = [row for statement in HISTORY_SQL for row in self._driver.execute(statement, (landmark,))]
         return tuple(sorted(map(_landmark, found), key=lambda row: row.valid_from_version))
 
-    def history(self, landmark: str) -> tuple[Landmark, ...]:
-        """Every row a landmark has had, in order of version."""
-        with database_errors(self._path):
-            found = [row for statement in HISTORY_SQL for row in self._driver.execute(statement, (landmark,))]
-        return tuple(sorted(map(_landmark, found), key=lambda row: row.valid_from_version))
-
     def changes(self, query: LandmarkQuery, *, since: int) -> LandmarkChanges:
         """What changed since a version among the landmarks that meet a query."""
         return changes_of(self, query, since=since)

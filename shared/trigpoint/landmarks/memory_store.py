@@ -69,11 +69,6 @@ class MemoryStore:
         found = [row for row in (*self._ended, *self._valid.values()) if row.landmark == landmark]
         return tuple(sorted(found, key=lambda row: row.valid_from_version))
 
-    def history(self, landmark: str) -> tuple[Landmark, ...]:
-        """Every row a landmark has had, in order of version."""
-        found = [row for row in (*self._ended, *self._valid.values()) if row.landmark == landmark]
-        return tuple(sorted(found, key=lambda row: row.valid_from_version))
-
     def changes(self, query: LandmarkQuery, *, since: int) -> LandmarkChanges:
         """What changed since a version among the landmarks that meet a query."""
         return changes_of(self, query, since=since)

@@ -36,9 +36,6 @@ class LandmarkStore(Protocol):
     def history(self, landmark: str) -> tuple[Landmark, ...]:
         """Every row a landmark has had, in order of version; none for an id the map never had."""
 
-    def history(self, landmark: str) -> tuple[Landmark, ...]:
-        """Every row a landmark has had, in order of version; none for an id the map never had."""
-
     def changes(self, query: LandmarkQuery, *, since: int) -> LandmarkChanges:
         """What changed between version `since` and the query's, among the landmarks that meet the query.
 

@@ -3,8 +3,9 @@
 from functools import lru_cache
 
 import numpy as np
-from geoalchemy2 import Geography, Geometry
-from sqlalchemy import ColumnElement, Row, Select, Table, cast, func, or_, select
+from geoalchemy2 import Geometry
+from sqlalchemy import ColumnElement, Row, Select, Table, func, literal_column, or_, select
+from sqlalchemy.types import NullType
 
 from trigpoint.geodesy.projection import WGS84, transform_coordinates
 from trigpoint.landmarks import tables
@@ -63,8 +64,11 @@ def _within(lon_deg: ColumnElement[float], lat_deg: ColumnElement[float], disc: 
 
 
 def _geography(lon_deg: ColumnElement[float] | float, lat_deg: ColumnElement[float] | float) -> ColumnElement[object]:
-    point = func.ST_SetSRID(func.ST_MakePoint(lon_deg, lat_deg), WGS84_SRID, type_=Geometry)
-    return cast(point, Geography(srid=-1))
+    place: ColumnElement[object] = func.geography(
+        func.ST_SetSRID(func.ST_MakePoint(lon_deg, lat_deg), literal_column(str(WGS84_SRID)), type_=NullType),
+        type_=NullType,
+    )
+    return place
 
 
 def _window(box: DegreeBox, version: MapVersion) -> ColumnElement[object]:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from psycopg import errors
 from sqlalchemy import BigInteger, Column, Connection, MetaData, Table, Text, delete, insert, select, text
+from sqlalchemy.exc import DBAPIError
 
 from trigpoint.errors import InputError
 from trigpoint.landmarks import postgis_schema, records, tables
@@ -37,9 +38,10 @@ class PostgisStore:
     """A LandmarkStore on a server; `url` is postgresql+psycopg://USER@HOST:PORT/DATABASE. Not for several threads.
 
     Opened to write it brings the schema up to date, and is the only one that writes until it is closed. Raises
-    InputError for a URL or password file that cannot be read, a database without PostGIS, and a schema newer than this
-    program; while `read_only` also for one that is missing or older. Raises DatabaseUnavailable where the server does
-    not answer, or another process writes; from then on every call does, and a new store has to be opened.
+    InputError for a URL or password file that cannot be read and for a schema newer than this program; while
+    `read_only` also for one that is missing or older. Raises DatabaseUnavailable where the server does not answer, or
+    another process writes; from then on every call does, and a new store has to be opened. Raises ServiceError for any
+    other error of the server, as where it lacks PostGIS.
     """
 
     def __init__(self, url: str, *, password_file: Path | None = None, read_only: bool = False) -> None:
@@ -67,10 +69,16 @@ class PostgisStore:
             _write_checkpoint(connection, checkpoint)
 
     def defer_indexes(self) -> None:
-        """Spatial indexes are gone until they are restored: an index made at once costs a tenth of one kept true."""
+        """Spatial indexes are gone until they are restored: an index made at once costs a tenth of one kept true.
+
+        They stay where a reader is in the way for longer than a writer waits.
+        """
         with self._session.transaction() as connection:
-            for name in postgis_schema.DEFERRED_INDEXES:
-                connection.execute(text(f"DROP INDEX IF EXISTS {name}"))
+            try:
+                connection.execute(text(f"DROP INDEX IF EXISTS {', '.join(postgis_schema.DEFERRED_INDEXES)}"))
+            except DBAPIError as error:
+                if not isinstance(error.orig, errors.LockNotAvailable):
+                    raise
 
     def restore_indexes(self) -> None:
         """Every spatial index is there; where one was missing, dead rows are swept away too."""
@@ -88,17 +96,6 @@ class PostgisStore:
         """The landmarks that meet a query."""
         with self._session.transaction() as connection:
             return _answered(connection, query)
-
-    def history(self, landmark: str) -> tuple[Landmark, ...]:
-        """Every row a landmark has had, in order of version."""
-        with self._session.transaction() as connection:
-            versions = _versions(connection)
-            found = []
-            for source in LANDMARK_TABLES if versions else ():
-                everything = landmark_statement(source, LandmarkQuery(), version=versions[0], older=False)
-                own = connection.execute(everything.where(source.c.landmark == landmark))
-                found += [found_landmark(row) for row in own]
-        return tuple(sorted(found, key=lambda row: row.valid_from_version))
 
     def history(self, landmark: str) -> tuple[Landmark, ...]:
         """Every row a landmark has had, in order of version."""

@@ -3,14 +3,15 @@
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
-from sqlalchemy import create_engine, text
+from sqlalchemy import Table, create_engine, text
 
 from landmark_databases.cluster import Cluster
-from landmark_maps.examples import change, checkpoint, landmark
+from landmark_maps.examples import change, checkpoint, landmark, version_row
 from trigpoint.errors import DatabaseUnavailable, InputError
 from trigpoint.landmarks import tables
+from trigpoint.landmarks.postgis_query import landmark_statement
 from trigpoint.landmarks.postgis_store import PostgisStore
-from trigpoint.landmarks.queries import LandmarkQuery
+from trigpoint.landmarks.queries import Disc, LandmarkQuery, box_around
 
 pytestmark = pytest.mark.postgis
 
@@ -126,18 +127,46 @@ def test_indexes_put_off_are_made_when_they_are_wanted(made: str) -> None:
     store.close()
 
 
-def test_near_is_looked_up_in_the_index_of_true_distances(made: str) -> None:
+def test_a_reader_in_the_way_leaves_the_indexes_as_they_are(made: str) -> None:
+    engine, store = create_engine(made), PostgisStore(made)
+    with engine.connect() as reader:
+        reader.execute(text("SELECT count(*) FROM landmarks"))
+        store.defer_indexes()
+    engine.dispose()
+    assert scalars(made, "SELECT count(*) FROM pg_indexes WHERE indexname = 'landmarks_geom'") == [1]
+    assert store.map_versions() == ()
+    store.close()
+
+
+def plan_of(url: str, source: Table, query: LandmarkQuery) -> str:
+    """How the server would look a query up, were the table too large to be read through."""
+    statement = landmark_statement(source, query, version=version_row(), older=False)
+    engine = create_engine(url)
+    with engine.connect() as connection:
+        connection.execute(text("SET enable_seqscan = off"))
+        sql = str(statement.compile(engine, compile_kwargs={"literal_binds": True}))
+        plan = "\n".join(connection.scalars(text(f"EXPLAIN {sql}")))
+    engine.dispose()
+    return plan
+
+
+@pytest.mark.parametrize(
+    ("source", "area", "index"),
+    [
+        (tables.landmarks, "near", "landmarks_place"),
+        (tables.landmarks, "bbox", "landmarks_geom"),
+        (tables.landmark_history, "near", "landmark_history_geom"),
+        (tables.landmark_history, "bbox", "landmark_history_geom"),
+    ],
+    ids=lambda value: getattr(value, "name", value),
+)
+def test_an_area_is_looked_up_in_an_index(made: str, source: Table, area: str, index: str) -> None:
     store = PostgisStore(made)
     store.apply(change(1, opened=[landmark("A", 0.0, 0.0)]), checkpoint(1))
     store.close()
-    place = "ST_SetSRID(ST_MakePoint(lon_deg, lat_deg), 4326)::geography"
-    executed(made, "ALTER DATABASE " + made.rpartition("/")[2] + " SET enable_seqscan = off")
-    plan = scalars(
-        made,
-        f"EXPLAIN SELECT landmark FROM landmarks WHERE ST_DWithin({place}, "
-        "ST_SetSRID(ST_MakePoint(151.18, -33.89), 4326)::geography, 20)",
-    )
-    assert any("landmarks_place" in str(line) for line in plan)
+    near = Disc(lat_deg=-33.895, lon_deg=151.183, radius_m=20.0)
+    query = LandmarkQuery(near=near) if area == "near" else LandmarkQuery(bbox=box_around(near))
+    assert f"Index Scan using {index}" in plan_of(made, source, query)
 
 
 def test_a_server_that_is_not_there_is_named_without_its_password(postgis: Cluster) -> None:
