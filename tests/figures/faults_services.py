@@ -12,7 +12,7 @@ from fleet_runs.driving import small_campus_drives
 from fleet_runs.footprint import Growth, growth, last_share
 from fleet_runs.killing import Killing
 from fleet_runs.load import Load, loaded
-from fleet_runs.outcome import Outcome, doubled, outcome_of, row_differences, stream_differences
+from fleet_runs.outcome import Outcome, doubled, map_differences, outcome_of, stream_differences
 from fleet_runs.running import FOLLOWERS, fleet_of, settle
 
 KILLS = int(os.environ.get("KILLS", "20"))  # of each service
@@ -46,7 +46,7 @@ def differing(service: str) -> Figure:
         found = [
             *stream_differences(killed, whole, streams=WRITTEN[service]),
             *doubled(killed),
-            *row_differences(killed, whole),
+            *map_differences(killed, whole),
         ]
         return Measurement(value=float(len(found)), command=f"{UP} & kill -9, {KILLS} times each service")
 

@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from command_runs.processes import Fleet
 from trigpoint.events.codec import encode
-from trigpoint.landmarks.model import MapRow
+from trigpoint.landmarks.model import Landmark, MapRow, MapVersion
 from trigpoint.landmarks.opening import geopackage_path, geopackage_url, opened_store
 from trigpoint.logs.mcap_log import McapLog
 from trigpoint_landmarks.core.comparison import differences
@@ -68,3 +68,22 @@ def doubled(outcome: Outcome) -> list[str]:
 def row_differences(ours: Outcome, theirs: Outcome) -> list[str]:
     """The rows of the database that are not the same."""
     return [f"{one.table} {one.key}: {one.detail}" for one in differences(ours.rows, theirs.rows)]
+
+
+def map_differences(ours: Outcome, theirs: Outcome) -> list[str]:
+    """Where the newest maps differ. How many versions came before, and when, depends on the clock of either run, so
+    that numbers of versions and what is left of former ones are not looked at; every value of the map itself is."""
+    held, other = (newest_map(outcome.rows) for outcome in (ours, theirs))
+    return [f"{one.table} {one.key}: {one.detail}" for one in differences(held, other)]
+
+
+def newest_map(rows: tuple[MapRow, ...]) -> list[MapRow]:
+    """The landmarks, trajectories, anchors and image offsets of the newest version, as of version 0."""
+    newest = max((row.map_version for row in rows if isinstance(row, MapVersion)), default=0)
+    found: list[MapRow] = []
+    for row in rows:
+        if isinstance(row, Landmark):
+            found += [replace(row, valid_from_version=0)] if row.valid_to_version is None else []
+        elif not isinstance(row, MapVersion) and row.map_version == newest:
+            found.append(replace(row, map_version=0))
+    return found
