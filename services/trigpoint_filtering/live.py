@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from types import TracebackType
 from typing import Self, cast
 
@@ -21,6 +22,7 @@ from trigpoint.logs.ports import RecallingLog
 from trigpoint.logs.readings import VEHICLE_PREFIX, pinned_frame, vehicle_streams
 from trigpoint.observability.metrics import Instruments
 from trigpoint_filtering.app import KINDS, STREAM
+from trigpoint_filtering.checkpoint import Progress, read_progress, write_progress
 from trigpoint_filtering.core.fleet_following import KEPT_BOOTS, DriveName, FleetFollower
 from trigpoint_filtering.core.follower import REORDER_NS
 from trigpoint_filtering.core.publication import output_boot_id
@@ -29,6 +31,7 @@ from trigpoint_filtering.settings import FilterSettings
 LOOK_S = 0.5  # between two looks at the log when nobody tells of news
 GATHER_S = 0.02  # after the first word of news: what comes together is appended together
 BATCH = 1024  # events taken at a time
+CHECKPOINT_S = 5.0  # between two checkpoints: so much is filtered again after a crash
 CLOSE_S = 5.0  # for what is still in the log when it is told to stop
 
 logger = logging.getLogger(__name__)
@@ -37,8 +40,9 @@ logger = logging.getLogger(__name__)
 class LiveFiltering:
     """Takes every vehicle's events from the log, in its order; appends its estimates, then publishes them.
 
-    A message on the bus only wakes it up, so that nothing is lost with one. After a restart each drive is filtered
-    from its beginning again, and what was said of it is not said twice. Close it, or leave its `with`.
+    A message on the bus only wakes it up, so that nothing is lost with one. After a restart it goes on from its
+    `checkpoint` file, without one each drive is filtered from its beginning again; what was said is not said twice.
+    Close it, or leave its `with`.
     """
 
     def __init__(
@@ -48,13 +52,15 @@ class LiveFiltering:
         settings: FilterSettings | None = None,
         *,
         root: str = DEFAULT_ROOT,
+        checkpoint: Path | None = None,
         instruments: Instruments | None = None,
     ) -> None:
         self._log, self._bus, self._root = log, bus, root
+        self._checkpoint, self._kept_s = checkpoint, time.monotonic()
         self._settings = settings or FilterSettings()
         self._instruments = instruments or Instruments("filtering")
         self._said = _said_before(log)
-        self._streams = StreamFollower(log, lambda stream: stream.startswith(VEHICLE_PREFIX), kinds=KINDS)
+        self._streams = StreamFollower(log, _is_vehicle, kinds=KINDS)
         self._fleet: FleetFollower | None = None
         self._had_all_s = time.monotonic()
         self._closed = False
@@ -88,11 +94,32 @@ class LiveFiltering:
         rows = [told for row in logged for told in fleet.take(cast(Envelope[Observed], row.envelope))]
         self._append(rows)
         self._show_lag()
+        if logged and time.monotonic() >= self._kept_s + CHECKPOINT_S:
+            self._keep(fleet)
         return bool(logged)
 
+    def _keep(self, fleet: FleetFollower) -> None:
+        """A checkpoint written, if there is a file for it; a disk that has no room for it has the log to itself."""
+        self._kept_s = time.monotonic()
+        if self._checkpoint is None:
+            return
+        taken = self._streams.checkpoint
+        try:
+            kept = Progress(frame=fleet.frame, settings=self._settings, taken=dict(taken), fleet=fleet)
+            write_progress(self._checkpoint, kept)
+        except OSError as error:
+            logger.warning("%s: no checkpoint written: %s", self._checkpoint, error)
+
     def _begun(self) -> FleetFollower | None:
-        """The fleet from the beginning of the log; None before a frame is pinned: the log keeps the events."""
+        """The fleet from the checkpoint, or from the beginning of the log; None before a frame is pinned: the log
+        keeps the events."""
         frame = pinned_frame(self._log)
+        kept = None
+        if frame is not None and self._checkpoint is not None:
+            kept = read_progress(self._checkpoint, frame=frame, settings=self._settings)
+        if kept is not None:
+            self._streams = StreamFollower(self._log, _is_vehicle, checkpoint=kept.taken, kinds=KINDS)
+            return kept.fleet
         return None if frame is None else FleetFollower(frame, self._settings, ended=tuple(self._whole_drives(frame)))
 
     def _whole_drives(self, frame: MapFrame) -> Iterator[DriveName]:
@@ -141,6 +168,7 @@ class LiveFiltering:
                 logger.warning("stopped before the end of the log", extra={"lag_events": self._streams.lag})
                 return
         if self._fleet is not None:
+            self._keep(self._fleet)
             self._append(list(self._fleet.finish()))
 
     def __enter__(self) -> Self:
@@ -153,6 +181,10 @@ class LiveFiltering:
             self.close()
         else:
             self._subscription.close()
+
+
+def _is_vehicle(stream: str) -> bool:
+    return stream.startswith(VEHICLE_PREFIX)
 
 
 @dataclass(frozen=True, slots=True)

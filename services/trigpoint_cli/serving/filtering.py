@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 from trigpoint.observability.metrics import Instruments
 from trigpoint.observability.running import Service
-from trigpoint_cli.serving.resources import opened_resources
+from trigpoint_cli.serving.resources import data_of, opened_resources
 from trigpoint_cli.settings import Settings
 from trigpoint_filtering.live import LiveFiltering
 
@@ -15,5 +15,10 @@ def opened(settings: Settings, instruments: Instruments) -> Iterator[Service]:
     """Filtering on the fleet's log and bus."""
     with opened_resources(settings) as resources:
         yield LiveFiltering(
-            resources.log, resources.bus, settings.filtering, root=settings.fleet.root, instruments=instruments
+            resources.log,
+            resources.bus,
+            settings.filtering,
+            root=settings.fleet.root,
+            checkpoint=data_of(settings).path / "checkpoints" / "filtering",
+            instruments=instruments,
         )
