@@ -10,7 +10,9 @@ from pathlib import Path
 
 import atheris  # type: ignore[import-untyped]
 
-with atheris.instrument_imports(include=["trigpoint", "trigpoint_ingest", "trigpoint_landmarks", "trigpoint_vehicle"]):
+with atheris.instrument_imports(
+    include=["trigpoint", "trigpoint_cli", "trigpoint_ingest", "trigpoint_landmarks", "trigpoint_vehicle"]
+):
     from fuzzed_decoders.seeds import seeds
     from fuzzed_decoders.targets import Decoder, decoders
 

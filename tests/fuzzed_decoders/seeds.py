@@ -28,7 +28,7 @@ fixes = { time = "t", lat = "lat", lon = "lon", sigma = 3 }
 wheel_speeds = { time = "t", speed = { column = "v", unit = "km/h" }, steering = { column = "s", unit = "deg" } }
 detections = { time = "t", range = "r", bearing = { column = "b", unit = "deg" }, kind = { value = "pole" } }
 """
-CONFIGURATION = b'[fleet]\nroot = "depot"\ndata = "data"\n[ingest]\nbatch_count = 100\n[bus]\nlisten = ["tcp/[::]:0"]\n'
+CONFIGURATION = b'[fleet]\nroot = "depot"\n[ingest]\nbatch_count = 100\n[bus]\nlisten = ["tcp/127.0.0.1:0"]\n'
 DEEP, ENDLESS = b"[" * 3000, b"9" * 5000
 
 
@@ -51,7 +51,13 @@ def seeds(folder: Path) -> dict[str, tuple[bytes, ...]]:
         ),
         "GeoPackage anchors": (_geopackage(folder / "seed.gpkg"),),
         "configuration": (CONFIGURATION, b"ingest = " + DEEP, b"ingest = " + ENDLESS),
-        "configuration's words": (b"ingest.batch_count=100", b"INGEST__BATCH_COUNT"),
+        "configuration's words": (
+            b"ingest.batch_count=100",
+            b"bus.listen=['tcp/127.0.0.1:0', 'tcp/127.0.0.1:1']",
+            b"INGEST__BATCH_COUNT",
+            b"ingest.vehicles=" + DEEP,
+            b"ingest.batch_count=" + ENDLESS,
+        ),
         "register of certificates": (_register(folder / "seed.json"), DEEP),
     }
 

@@ -11,12 +11,13 @@ from trigpoint.bus.arrivals import Arrival, messages_of, runs_of
 from trigpoint.bus.attachment import decode_attachment
 from trigpoint.bus.key_expressions import checked_expression, checked_key
 from trigpoint.bus.register import read_register
-from trigpoint.configuration.given import from_environment, from_flags, from_toml
+from trigpoint.configuration.given import from_environment
 from trigpoint.errors import InputError
 from trigpoint.events.codec import decode, encode, event_classes, schema_name
 from trigpoint.landmarks.queries import LandmarkQuery, area_box
 from trigpoint.logs.vehicle_log import read_vehicle_log, read_whole_messages
 from trigpoint.logs.verification import verify
+from trigpoint_cli.settings import configured_settings
 from trigpoint_ingest.anchor_files import read_anchor_file
 from trigpoint_landmarks.core.questions import bbox_of, near_of
 from trigpoint_vehicle.core.spool_walk import contents_of
@@ -81,14 +82,14 @@ def _manifest(data: bytes) -> None:
 
 def _configuration(data: bytes, path: Path) -> None:
     path.write_bytes(data)
-    from_toml(path)
+    configured_settings(path, ("fleet.data=data",))
 
 
 def _configuration_words(data: bytes) -> None:
-    """As a flag and as the name of a variable."""
+    """As a flag over a valid configuration, and as the name of a variable."""
     text = data.decode("utf-8", "replace")
     from_environment({f"TRIGPOINT_{text}": text})
-    from_flags((text,))
+    configured_settings(None, ("fleet.data=data", text))
 
 
 def _anchor_file(data: bytes, path: Path) -> None:

@@ -127,7 +127,7 @@ def _of_text(text: str, adapter: TypeAdapter[object]) -> object:
 def _readings(text: str) -> list[object]:
     try:
         return [text, tomllib.loads(f"value = {text}")["value"]]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):  # no TOML, endless digits or brackets
         return [text, [part.strip() for part in text.split(",")] if text else []]
 
 

@@ -48,6 +48,8 @@ def test_a_changed_input_is_taken_or_refused_and_nothing_else(fuzzed: Fuzzed, na
         ("table manifest", b"vehicle = " + b"9" * 5000),
         ("configuration", b"ingest = " + b"[" * 3000),
         ("configuration", b"ingest = " + b"9" * 5000),
+        ("configuration's words", b"ingest.batch_count=" + b"[" * 3000),
+        ("configuration's words", b"ingest.batch_count=" + b"9" * 5000),
         ("register of certificates", b"[" * 3000),
         ("GeoJSON anchors", b"[" * 3000),
     ],
