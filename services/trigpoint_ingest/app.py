@@ -87,7 +87,8 @@ class IngestService:
         taken = self._reception.take(timeout_s) if has_room else 0
         self._reception.settle()
         self._advance()
-        self._instruments.queue_depth.set(self._reception.waiting + self._journal.pending_count)
+        waiting = self._reception.waiting + self._reception.arrived
+        self._instruments.queue_depth.set(waiting + self._journal.pending_count)
         return taken > 0
 
     def _advance(self) -> None:
@@ -106,7 +107,8 @@ class IngestService:
 
     def _is_due(self, now_s: float) -> bool:
         journal, settings = self._journal, self._settings
-        if journal.pending_count >= settings.batch_count or journal.pending_bytes >= settings.batch_bytes:
+        waiting = journal.pending_count + self._reception.arrived
+        if waiting >= settings.live_batch_count or journal.pending_bytes >= settings.batch_bytes:
             return True
         return now_s - self._sealed_s >= self._settings.batch_s and self._has_work()
 
@@ -114,6 +116,7 @@ class IngestService:
         return self._journal.pending_count > 0 or self._reception.has_to_acknowledge
 
     def _sealed(self) -> Group:
+        self._reception.hand_on()
         group = self._journal.sealed()
         group.acknowledgements.extend(self._reception.acknowledgements())
         self._sealed_s = self._now_s()

@@ -26,6 +26,7 @@ from trigpoint_ingest.settings import IngestSettings
 TAKEN_AT_ONCE = 8192  # messages, before what is due is looked at
 CUT_OFF_S = 10.0  # a vehicle with something missing that is silent for so long has no link, and sends it again later
 TAKEN_AT_ONCE_BYTES = 8 * 1024 * 1024
+HANDED_ON_COUNT, HANDED_ON_BYTES = 2048, 1024 * 1024  # taken, which are handed on before a group is due
 WRONG_SENDER = "wrong sender"
 TOO_LARGE = "too large"
 TOO_MANY_DRIVES, TOO_MANY_MESSAGES, TOO_MANY_NAMES = "too many drives", "too many messages", "too many names"
@@ -49,6 +50,7 @@ class Reception:
         self._journal, self._settings, self._instruments = journal, settings, instruments
         self._now_s = now_s
         self._arrived: dict[Drive, list[EncodedRun]] = {}
+        self._arrived_count = self._arrived_bytes = 0
         self._orders: dict[Drive, RunOrder] = {}
         self._gap_since_s: dict[Drive, float] = {}
         self._gap_heard_s: dict[Drive, float] = {}  # when a drive with a gap was last heard
@@ -64,13 +66,19 @@ class Reception:
         return sum(subscription.waiting for subscription in self._subscriptions)
 
     @property
+    def arrived(self) -> int:
+        """How many messages were taken and not handed on."""
+        return self._arrived_count
+
+    @property
     def has_to_acknowledge(self) -> bool:
         """Whether a vehicle sent something since the last acknowledgements."""
-        return bool(self._to_acknowledge)
+        return bool(self._to_acknowledge) or self._arrived_count > 0
 
     def take(self, timeout_s: float) -> int:
         """How many messages came: all there are now, TAKEN_AT_ONCE or a few more at most; the first of each
-        subscription may take until the timeout to come."""
+        subscription may take until the timeout to come. They are handed on together: for a few at a time the columns
+        cost more than they save."""
         taken = taken_bytes = 0
         for subscription in self._subscriptions:
             found = subscription.receive_run(timeout_s)
@@ -80,9 +88,17 @@ class Reception:
                 taken_bytes += sum(map(len, found.run.payloads))
                 has_room = taken < TAKEN_AT_ONCE and taken_bytes < TAKEN_AT_ONCE_BYTES
                 found = subscription.receive_run(0.0) if has_room else None
-        for drive in list(self._arrived):
-            self._order(drive, self._arrived.pop(drive))
+        self._arrived_bytes += taken_bytes
+        if self._arrived_count >= HANDED_ON_COUNT or self._arrived_bytes >= HANDED_ON_BYTES:
+            self.hand_on()
         return taken
+
+    def hand_on(self) -> None:
+        """What was taken put in order, and given to the journal as far as it may go on."""
+        arrived, self._arrived = self._arrived, {}
+        self._arrived_count = self._arrived_bytes = 0
+        for drive, runs in arrived.items():
+            self._order(drive, runs)
 
     def _take(self, found: BusRun) -> None:
         """The run kept for its drive, as much of it as its sender may send."""
@@ -97,6 +113,7 @@ class Reception:
             self._refuse_impostor(sender, run)
         elif self._journal.admission.has_room_for(drive):
             self._arrived.setdefault(drive, []).append(run)
+            self._arrived_count += len(run)
         else:
             self._tell_once(sender, TOO_MANY_DRIVES, f"limit {self._settings.drive_limit}: not taken, not acknowledged")
             self._instruments.rejected.labels(sender, TOO_MANY_DRIVES).inc(len(run))

@@ -13,10 +13,10 @@ class IngestSettings:
     """`fleet` names the only vehicles accepted, None accepts all that describe themselves. `vehicles` names those
     this process takes, where several share a fleet; without any it takes them all.
 
-    Events are appended `batch_count` or `batch_bytes` at a time, or after `batch_s` for those that come live; while
-    a group waits for the disk, `pending_count` more messages or `pending_bytes` of payload are taken, then none.
-    A live message waits up to `gap_timeout_s` for an earlier one, with at most `held_limit` others of its drive. Of
-    a refused payload `refused_payload_limit` bytes are kept.
+    Events of files are appended `batch_count` at a time, those that come live `live_batch_count` or `batch_bytes`, or
+    what there is after `batch_s`; while a group waits for the disk, `pending_count` more messages or `pending_bytes`
+    of payload are taken, then none. A live message waits up to `gap_timeout_s` for an earlier one, with at most
+    `held_limit` others of its drive. Of a refused payload `refused_payload_limit` bytes are kept.
 
     A payload has at most `message_limit_bytes`. A vehicle may send `vehicle_rate_hz` messages a second, and
     `vehicle_burst` at once. At most `drive_limit` drives are known, and
@@ -29,7 +29,8 @@ class IngestSettings:
     fleet: frozenset[str] | None = None
     vehicles: tuple[str, ...] = ()
     stamps: StampLimits = field(default_factory=StampLimits)
-    batch_count: int = 1024
+    batch_count: int = 4096
+    live_batch_count: int = 256
     batch_bytes: int = 4 * 1024 * 1024
     batch_s: float = 0.1
     pending_count: int = 65_536

@@ -27,7 +27,7 @@ from trigpoint_ingest.settings import IngestSettings
 from trigpoint_vehicle.replay import ReplaySettings, replay_log, replay_rows
 
 Rows = list[Envelope[Observed]]
-SETTINGS = IngestSettings(batch_count=200, batch_s=0.02)
+SETTINGS = IngestSettings(live_batch_count=200, batch_s=0.02)
 PATIENT = ReplaySettings(window=500, ack_timeout_s=0.2, attempts=50)
 
 
