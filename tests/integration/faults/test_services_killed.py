@@ -81,7 +81,7 @@ def test_a_fleet_whose_services_are_killed_ends_with_the_map_of_one_left_in_peac
     outcomes = []
     for name, plan in (("killed", killing), ("whole", None)):
         fleet = fleet_of(tmp_path / name)
-        drive(fleet, drives, speed=4.0, killing=plan)
+        drive(fleet, drives, speed=8.0, killing=plan)
         settle(fleet)
         outcomes.append(outcome_of(fleet))
     assert doubled(outcomes[0]) == []
