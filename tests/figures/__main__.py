@@ -15,6 +15,7 @@ from figures import (
     faults_postgis,
     faults_services,
     ingest,
+    live,
     mrclam,
     nclt,
     projection,
@@ -39,6 +40,7 @@ GROUPS: Mapping[str, Sequence[Figure]] = {
         *faults_services.FIGURES,
     ),
     "ingest": (*ingest.FIGURES, *projection.FIGURES),
+    "live": live.FIGURES,
     "security": (*security.FIGURES, *security_fuzz.FIGURES),
 }
 PROGRAM = (str(Path(sys.executable).with_name("trigpoint")),)

@@ -1,0 +1,83 @@
+"""Estimation that keeps up: update times in a large map, landmarks seen to be there, a vehicle without a receiver."""
+
+from collections.abc import Callable
+from functools import cache, partial
+from pathlib import Path
+
+from figures.figure import Bounds, Figure, Measurement, at_most
+from figures.workbench import Workbench
+from live_runs.campus_drives import Placed, UpdateTimes, update_times, without_receiver
+from live_runs.visibility import Visible, visible_within
+
+VEHICLES, POSES, SEED = 5, 10_000, 1
+SECONDS = 60.0
+UPDATES = f"live_runs.campus_drives.update_times(vehicles={VEHICLES}, poses={POSES}, seed={SEED})"
+VISIBLE = f"live_runs.visibility.visible_within(seconds={SECONDS:g}, seed={SEED})"
+PLACED = f"live_runs.campus_drives.without_receiver(seed={SEED})"
+
+
+@cache
+def updates() -> UpdateTimes:
+    """The campus driven by enough vehicles for the map to have so many poses."""
+    return update_times(vehicles=VEHICLES, poses=POSES, seed=SEED)
+
+
+@cache
+def visible(folder: Path) -> Visible:
+    """A drive in its own time."""
+    return visible_within(folder / "visible", seconds=SECONDS, seed=SEED)
+
+
+@cache
+def placed() -> Placed:
+    """The second vehicle of the campus, its receiver taken away."""
+    return without_receiver(seed=SEED)
+
+
+def of_updates(bench: Workbench, *, value: Callable[[UpdateTimes], float]) -> Measurement:
+    """A number of the update times."""
+    return Measurement(value=value(updates()), command=UPDATES)
+
+
+def of_visible(bench: Workbench, *, value: Callable[[Visible], float]) -> Measurement:
+    """A number of how soon landmarks are in the database."""
+    return Measurement(value=value(visible(bench.folder)), command=VISIBLE)
+
+
+def of_placed(bench: Workbench, *, value: Callable[[Placed], float]) -> Measurement:
+    """A number of the vehicle without a receiver."""
+    return Measurement(value=value(placed()), command=PLACED)
+
+
+def figure(name: str, unit: str, target: Bounds | None, measure: Callable[[Workbench], Measurement]) -> Figure:
+    """A figure of this group."""
+    return Figure(name=name, unit=unit, target=target, measure=measure)
+
+
+FIGURES = (
+    figure(
+        "incremental update, 10,000 poses in the map, p99",
+        "ms",
+        at_most(100.0),
+        partial(of_updates, value=lambda found: found.p99_ms),
+    ),
+    figure(
+        "the same, the processor's time", "ms", None, partial(of_updates, value=lambda found: found.p99_processor_ms)
+    ),
+    figure(
+        "from a sweep in the log to its landmark in the database, p95",
+        "s",
+        at_most(2.0),
+        partial(of_visible, value=lambda found: found.p95_s),
+    ),
+    figure("the same, largest", "s", None, partial(of_visible, value=lambda found: found.most_s)),
+    figure(
+        "no receiver: mean error against truth",
+        "m",
+        None,
+        partial(of_placed, value=lambda found: found.mean_m),
+    ),
+    figure("no receiver: largest error", "m", None, partial(of_placed, value=lambda found: found.worst_m)),
+    figure("no receiver: until it has a place", "s", None, partial(of_placed, value=lambda found: found.after_s)),
+    figure("no receiver: NEES per degree of freedom", "", None, partial(of_placed, value=lambda found: found.nees)),
+)
