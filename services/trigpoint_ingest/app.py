@@ -19,7 +19,7 @@ from trigpoint_ingest.journal import Journal
 from trigpoint_ingest.reception import Reception
 from trigpoint_ingest.settings import IngestSettings
 
-IDLE_S = 0.005  # between two looks at an empty queue: waiting for each message costs more than the message
+IDLE_S = 0.002  # between two looks at an empty queue: waiting for each message costs more than the message
 CLAIM_LOOK_S = 1.0  # between two looks at others' claims
 
 logger = logging.getLogger(__name__)
