@@ -12,7 +12,7 @@ from figures.workbench import Workbench
 from ingest_load.racing import VEHICLES, Race, latency_s, median, raced
 
 SMALL_BYTES, SMALL_MESSAGES = 256, 30_000  # of each vehicle
-LARGE_BYTES, LARGE_MESSAGES = 500_000, 60
+LARGE_BYTES, LARGE_MESSAGES = 500_000, 120
 RACES = 3
 LATENCY_SHARE = 0.2
 LATENCY_LIMIT_S = 0.05

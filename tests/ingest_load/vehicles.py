@@ -47,6 +47,8 @@ class Vehicle:
     def send(self, bus: ZenohBus) -> None:
         """The next run sent."""
         run = self.runs[self.next_run]
+        if self.sent == self.acknowledged:
+            self.progress_s = time.monotonic()
         bus.publish_run(run)
         self.sent_s += [time.monotonic()] * len(run.run)
         self.next_run += 1
