@@ -34,10 +34,11 @@ class FileBytes:
         for start in range(0, self.size_bytes, BLOCK_BYTES):
             yield self.read(start, min(start + BLOCK_BYTES, self.size_bytes))
 
-    def find(self, wanted: bytes, start: int) -> int:
-        """The first position of `wanted` from `start` on, -1 if there is none."""
-        for block_start in range(start, self.size_bytes, BLOCK_BYTES):
-            found = self.read(block_start, block_start + BLOCK_BYTES + len(wanted) - 1).find(wanted)
+    def find(self, wanted: bytes, start: int, stop: int) -> int:
+        """The first position of `wanted` from `start` on that is before `stop`, -1 if there is none."""
+        for block_start in range(start, min(stop, self.size_bytes), BLOCK_BYTES):
+            block_stop = min(block_start + BLOCK_BYTES, stop)
+            found = self.read(block_start, block_stop + len(wanted) - 1).find(wanted)
             if found >= 0:
                 return block_start + found
         return -1

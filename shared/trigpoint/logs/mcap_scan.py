@@ -108,12 +108,26 @@ class McapScan:
             self.summary_fault = self._read_summary(content)
             offset = self._start(content)
             while not self.finished and offset < content.size_bytes:
-                following = self._following(content, offset)
+                following, known = self._following(content, offset), len(self.damages)
                 if following > offset:
                     yield from self._record(content, offset, following)
-                offset = following if following > offset else self._next_chunk(content, offset + 1)
+                if following == offset:
+                    offset = self._resumed(content, offset)
+                elif len(self.damages) > known:  # its length may be wrong as well
+                    offset = self._next_chunk(content, offset + 1, following)
+                else:
+                    offset = following
             if not self.finished:
                 self._damaged(content.size_bytes, "file ends without the end of its data section", lost=0)
+
+    def _resumed(self, content: FileBytes, offset: int) -> int:
+        """Where reading goes on after no record was found at `offset`: a wrong length may have led there, past chunks
+        that are whole, so that what lies behind the last one read is looked through again."""
+        trusted = max(self.whole_end, len(MAGIC))
+        following = self._next_chunk(content, trusted, content.size_bytes)
+        if following < offset:
+            self.damages[-1] = replace(self.damages[-1], offset=trusted)
+        return following
 
     def _start(self, content: FileBytes) -> int:
         head = content.read(0, len(MAGIC))
@@ -146,17 +160,24 @@ class McapScan:
         try:
             if opcode in (Opcode.CHUNK, Opcode.MESSAGE):
                 self._lost_chunk = False
-                yield self._chunk(record, offset)
-                self.whole_end = following
+                chunk = self._chunk(record, offset)
+                self.whole_end = offset + chunk.length
+                yield chunk
+            elif _stands_for_chunk(content, offset):
+                raise LogDamaged(f"record {opcode} of {following - offset} bytes holds what a chunk does")
             elif opcode == Opcode.DATA_END:
                 self._end_of_data(content, offset, following)
             else:
                 self._side_record(record, offset, following - offset)
         except LogDamaged as error:
+            costly = opcode in (Opcode.CHUNK, Opcode.MESSAGE) or _stands_for_chunk(content, offset)
+            miscounted = self._lost_chunk and opcode == Opcode.MESSAGE_INDEX
             self._lost_chunk = self._lost_chunk or opcode == Opcode.CHUNK
-            self._damaged(offset, str(error), lost=UNKNOWN if opcode in (Opcode.CHUNK, Opcode.MESSAGE) else 0)
+            self._damaged(offset, str(error), lost=UNKNOWN if costly or miscounted else 0)
 
     def _chunk(self, record: bytes, offset: int) -> ScannedChunk:
+        if record[0] == Opcode.MESSAGE and self._checksums_required:
+            raise LogDamaged(f"message of {len(record)} bytes outside of a chunk, where none was written")
         if record[0] == Opcode.MESSAGE:
             (message,) = messages(record)
             return ScannedChunk(offset, len(record), message.log_time_ns, message.log_time_ns, record)
@@ -171,7 +192,10 @@ class McapScan:
         if count and held != (chunk.message_start_time, chunk.message_end_time):
             said = f"[{chunk.message_start_time}, {chunk.message_end_time}]"
             self._damaged(offset, f"chunk's header says times {said} ns, its messages have {list(held)}", lost=0)
-        return ScannedChunk(offset, len(record), *held, data)
+        length = CHUNK_HEAD_BYTES + 4 + len(chunk.compression.encode()) + 8 + len(chunk.data)
+        if length != len(record):
+            self._damaged(offset, f"record of {len(record)} bytes holds a chunk of {length}", lost=0)
+        return ScannedChunk(offset, length, *held, data)
 
     def _side_record(self, record: bytes, offset: int, length: int) -> None:
         opcode, body = record[0], record[FRAME.size :]
@@ -184,8 +208,10 @@ class McapScan:
                 raise LogDamaged(f"more than {METADATA_LIMIT} metadata records: not kept")
             self.metadata[metadata.name] = metadata.metadata
             self.metadata_indexes.append(MetadataIndex(offset=offset, length=length, name=metadata.name))
-        elif opcode == Opcode.MESSAGE_INDEX and self._lost_chunk:
-            self._count_lost(index_count(record, length))
+        elif opcode == Opcode.MESSAGE_INDEX:
+            count = index_count(record, length)
+            if self._lost_chunk:
+                self._count_lost(count)
 
     def _count_lost(self, count: int) -> None:
         """A message index after a damaged chunk says how many messages of one channel it held."""
@@ -220,18 +246,20 @@ class McapScan:
             raise LogDamaged(f"definitions of {self._kept_bytes + length} bytes, at most {DEFINITIONS_LIMIT_BYTES}")
         self._kept_bytes += length
 
-    def _next_chunk(self, content: FileBytes, offset: int) -> int:
-        """Where the next chunk that checks starts, or the file's end."""
+    def _next_chunk(self, content: FileBytes, offset: int, stop: int) -> int:
+        """Where the next chunk before `stop` that checks starts, or `stop`."""
         while True:
-            found = (content.find(name, offset + CHUNK_HEAD_BYTES) for name in COMPRESSION_NAMES)
+            found = (content.find(name, offset + CHUNK_HEAD_BYTES, stop) for name in COMPRESSION_NAMES)
             start = min((position - CHUNK_HEAD_BYTES for position in found if position >= 0), default=None)
             if start is None:
-                return content.size_bytes
+                return stop
             if _is_whole_chunk(content, start):
                 return start
             offset = start + 1
 
     def _end_of_data(self, content: FileBytes, offset: int, following: int) -> None:
+        if following - offset != DATA_END_BYTES:
+            raise LogDamaged(f"end of the data section of {following - offset} bytes, it has {DATA_END_BYTES}")
         said = parsed(DataEnd, content.read(offset + FRAME.size, following)).data_section_crc
         if (said or self._checksums_required) and not self.damages:
             held = content.checksum(0, offset)
@@ -284,6 +312,12 @@ def _is_our_own(content: FileBytes) -> bool:
     """Whether the header names our writer, which gives everything a checksum; others may leave them out."""
     head = Header(profile="", library=LIBRARY)
     return content.read(len(MAGIC), len(MAGIC) + len(record_bytes(head))) == record_bytes(head)
+
+
+def _stands_for_chunk(content: FileBytes, offset: int) -> bool:
+    """Whether a record is laid out as a compressed chunk, whatever its opcode says."""
+    name = content.read(offset + CHUNK_HEAD_BYTES, offset + CHUNK_HEAD_BYTES + max(map(len, COMPRESSION_NAMES)))
+    return name.startswith(COMPRESSION_NAMES)
 
 
 def _is_whole_chunk(content: FileBytes, offset: int) -> bool:

@@ -181,3 +181,37 @@ def test_between_two_unknown_losses_what_was_known_of_a_piece_counts() -> None:
 def test_what_was_known_of_a_piece_with_another_count_is_not_believed() -> None:
     found = numbered([Piece(0, 10), Piece(100, 10)], first_number=0, stop_number=None, known={100: (30, 11)})
     assert [piece.number for piece in found] == [0, 10]
+
+
+def _with_flips(source: Path, *places: tuple[int, int]) -> None:
+    content = bytearray(_file(source, 0).read_bytes())
+    for at, bit in places:
+        content[at] ^= bit
+    _file(source, 0).write_bytes(content)
+
+
+def _frames(source: Path) -> list[int]:
+    """Where each record of the data section of the first file begins."""
+    content, offset, found = _file(source, 0).read_bytes(), 8, []
+    while content[offset] != 0x0F:
+        found.append(offset)
+        offset += 9 + int.from_bytes(content[offset + 1 : offset + 9], "little")
+    return [*found, offset]
+
+
+@pytest.mark.parametrize("bit", [1 << 2, 1 << 8, 1 << 9, 1 << 10])
+@pytest.mark.parametrize("index", [0, 1, 5, 6, 9, 12])
+def test_a_wrong_length_costs_the_events_of_no_other_chunk(source: Path, out: Path, index: int, bit: int) -> None:
+    (source / "catalog.sqlite").unlink()
+    _with_flips(source, (_frames(source)[index] + 1 + (bit > 255), bit if bit < 256 else bit >> 8))
+    assert _van(source, out).count >= EVENTS - 20
+
+
+@pytest.mark.parametrize("bit", [1, 2, 4, 8, 16, 128])
+@pytest.mark.parametrize("index", [0, 3, 4, -1])
+def test_a_record_of_another_kind_costs_no_event_of_another(source: Path, out: Path, index: int, bit: int) -> None:
+    (source / "catalog.sqlite").unlink()
+    _with_flips(source, (_frames(source)[index], bit))
+    recovered = _van(source, out)
+    assert recovered.count >= EVENTS - 20
+    assert recovered.count + recovered.lost_count == EVENTS
