@@ -45,6 +45,7 @@ def tls_values(files: TlsFiles) -> Iterator[tuple[str, object]]:
     }
     yield "transport/link/tls", values
     yield "transport/link/protocols", ["tls"]
+    yield "transport/shared_memory/enabled", False  # large messages go by the protected link, too
 
 
 def checked_endpoints(listen: Sequence[str], connect: Sequence[str], files: TlsFiles | None) -> None:
