@@ -39,6 +39,7 @@ DROP_OLDEST = "drop oldest"
 DAMAGED_SUFFIX = ".damaged"
 LET_GO_SHARE = 4  # a segment that is a quarter full is closed once all of it is released
 HEADS_BYTES = 512  # what goes with a payload at most: its record's head, its channel, its segment's beginning
+UNKNOWN = -1  # the boot's next number, where a segment begins with a message of another
 NS_PER_S = 1_000_000_000
 
 logger = logging.getLogger(__name__)
@@ -128,7 +129,7 @@ class Spool:
         now_ns = self._now_ns()
         with self._mutex:
             size = len(payload)
-            writer = self._room_for(size + HEADS_BYTES, now_ns, sequence)
+            writer = self._room_for(size + HEADS_BYTES, now_ns, sequence if channel.numbered else UNKNOWN)
             number = self._channels.get(channel, len(self._channels))
             data = encode_record(MESSAGE, number, sequence, stamp_ns, now_ns, payload)
             if channel not in self._channels:

@@ -84,7 +84,7 @@ class SpoolReader:
             yield messages
 
     def _take_note(self, record: Record, channels: dict[int, tuple[SendChannel, bool]]) -> None:
-        if record.kind == SEGMENT:
+        if record.kind == SEGMENT and record.sequence >= 0:
             self._expected.setdefault(segment_of(record)[1], record.sequence)
         elif record.kind == CHANNEL:
             spooled = channel_of(record)

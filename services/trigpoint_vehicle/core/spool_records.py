@@ -3,7 +3,8 @@
 A record, little-endian: CRC-32 of all that follows u32, size of its body u32, kind u8, mark 0xA5, channel u16,
 sequence i64, stamp in ns i64, time of spooling in ns i64, body. What the fields mean depends on the kind:
 
-- SEGMENT, the first of a file: body is the vehicle and the boot that writes it, `sequence` the boot's next number.
+- SEGMENT, the first of a file: body is the vehicle and the boot that writes it, `sequence` the boot's next number
+  (-1: unknown).
 - CHANNEL, before a channel is used: body is source, boot id, schema name, and "n" where its numbers leave no gaps.
 - MESSAGE: body is the payload.
 - SEALED, the last of a file that was closed in order: it holds `sequence` messages with `stamp` bytes of payload.
