@@ -67,13 +67,13 @@ class GeoPackageStore:
     def apply_all(self, changes: Sequence[MapChange], checkpoint: Checkpoint) -> None:
         """Consecutive map versions and their checkpoint in one transaction."""
         with database_errors(self._path), transaction(self._connection):
-            versions = self._versions()
+            held = self._newest()
             for change in changes:
-                require_next_version(change.version, versions)
-                if not versions:
+                require_next_version(change.version, held)
+                if not held:
                     self._adopt_crs(change.version.crs)
                 self._write(change)
-                versions = (change.version,)
+                held = (change.version,)
             self._write_checkpoint(checkpoint)
             self._date_layers(changes[-1].version.solved_ns)
         self._extent = None
@@ -143,9 +143,13 @@ class GeoPackageStore:
         ordered = select(tables.map_versions).order_by(tables.map_versions.c.map_version)
         return tuple(records.map_version_of(dict(record)) for record in self._connection.execute(ordered).mappings())
 
+    def _newest(self) -> tuple[MapVersion, ...]:
+        """The newest version, none before the first."""
+        found = self._connection.execute(tables.newest_version()).mappings()
+        return tuple(records.map_version_of(dict(record)) for record in found)
+
     def _is_older(self, as_of: int) -> bool:
-        numbers = select(tables.map_versions.c.map_version).order_by(tables.map_versions.c.map_version)
-        known: tuple[int, ...] = tuple(self._connection.scalars(numbers))
+        known: tuple[int, ...] = tuple(self._connection.scalars(tables.versions_around(as_of)))
         require_known_version(as_of, known)
         return as_of < known[-1]
 

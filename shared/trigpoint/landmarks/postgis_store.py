@@ -59,12 +59,12 @@ class PostgisStore:
     def apply_all(self, changes: Sequence[MapChange], checkpoint: Checkpoint) -> None:
         """Consecutive map versions and their checkpoint in one transaction."""
         with self._session.transaction() as connection:
-            versions = _versions(connection)
-            if not versions:
+            held = _newest(connection)
+            if not held:
                 postgis_schema.adopt_crs(connection, changes[0].version.crs)
             for change in changes:
-                require_next_version(change.version, versions)
-                versions = (change.version,)
+                require_next_version(change.version, held)
+                held = (change.version,)
             _write(connection, changes)
             _write_checkpoint(connection, checkpoint)
 
@@ -172,16 +172,22 @@ def _versions(connection: Connection) -> tuple[MapVersion, ...]:
     return tuple(records.map_version_of(dict(record)) for record in connection.execute(ordered).mappings())
 
 
+def _newest(connection: Connection) -> tuple[MapVersion, ...]:
+    """The newest version, none before the first."""
+    found = connection.execute(tables.newest_version()).mappings()
+    return tuple(records.map_version_of(dict(record)) for record in found)
+
+
 def _answered(connection: Connection, query: LandmarkQuery) -> tuple[Landmark, ...]:
-    versions = _versions(connection)
     if query.as_of is not None:
-        require_known_version(query.as_of, [version.map_version for version in versions])
-    if not versions:
+        require_known_version(query.as_of, tuple(connection.scalars(tables.versions_around(query.as_of))))
+    newest = _newest(connection)
+    if not newest:
         return ()
-    older = query.as_of is not None and query.as_of < versions[-1].map_version
+    older = query.as_of is not None and query.as_of < newest[0].map_version
     found = []
     for source in LANDMARK_TABLES if older else LANDMARK_TABLES[:1]:
-        statement = landmark_statement(source, query, version=versions[0], older=older)
+        statement = landmark_statement(source, query, version=newest[0], older=older)
         found += [found_landmark(row) for row in connection.execute(statement)]
     return answered(found, query)
 

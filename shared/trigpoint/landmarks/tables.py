@@ -2,7 +2,21 @@
 
 from typing import Any
 
-from sqlalchemy import REAL, BigInteger, Boolean, Column, Double, Integer, MetaData, Table, Text, UniqueConstraint
+from sqlalchemy import (
+    REAL,
+    BigInteger,
+    Boolean,
+    Column,
+    Double,
+    Integer,
+    MetaData,
+    Select,
+    Table,
+    Text,
+    UniqueConstraint,
+    func,
+    select,
+)
 from sqlalchemy.engine import Dialect
 from sqlalchemy.types import LargeBinary, TypeDecorator, TypeEngine, UserDefinedType
 
@@ -200,3 +214,15 @@ CURRENT_VIEWS = {
     "current_trajectories": _current("trajectories", "vehicle", "boot_id"),
     "current_anchors": _current("anchors", "anchor", "image"),
 }
+
+
+def newest_version() -> Select[tuple[Any, ...]]:
+    """The row of the newest version."""
+    return select(map_versions).order_by(map_versions.c.map_version.desc()).limit(1)
+
+
+def versions_around(map_version: int) -> Select[tuple[int]]:
+    """The numbers of the first version, of this one if it is there, and of the newest, in order."""
+    number = map_versions.c.map_version
+    ends = (select(func.min(number)).scalar_subquery(), select(func.max(number)).scalar_subquery())
+    return select(number).where(number.in_((*ends, map_version))).order_by(number)
