@@ -243,7 +243,8 @@ class LiveOptimisation:
     def _reason_to_solve(self) -> str:
         assert self._fleet is not None, "begun before"
         live, now_s, growing = self._settings.live, time.monotonic(), self._fleet.map
-        if self._correction_s is not None and now_s >= self._correction_s + live.correction_delay_s:
+        corrected = self._correction_s is not None and now_s >= self._correction_s + live.correction_delay_s
+        if corrected and input_positions(self._log) != self._tried_inputs:
             return "labels or excluded drives changed"
         if now_s >= self._solved_s + live.solve_interval_s:
             if growing.doubt:
@@ -264,6 +265,7 @@ class LiveOptimisation:
             logger.warning("%s", line)
         if found.refusal:
             logger.warning("the whole map cannot be solved: %s", found.refusal)
+            self._correction_s = time.monotonic() + self._settings.live.solve_interval_s  # with more data perhaps
             return
         self._append_version(found.events, stamp_ns=found.stamp_ns)
         self._solved_inputs = found.inputs

@@ -26,7 +26,7 @@ from trigpoint_vehicle.core.campus import Campus, simulate_campus
 from trigpoint_vehicle.core.campus_settings import CampusSettings
 
 STEP_S = 0.1  # appended together
-WARM_UP_S = 60.0  # taken in at once: the drive has a place then
+WARM_UP_S = 100.0  # taken in at once: the drive has found its place then
 NO_WHOLE_SOLVES = SolveSettings(live=LiveSettings(settle_s=1e9, solve_interval_s=1e9, correction_delay_s=1e9))
 
 

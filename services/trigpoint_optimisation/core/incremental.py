@@ -11,6 +11,7 @@ import gtsam
 import numpy as np
 from numpy.typing import NDArray
 
+from trigpoint.errors import ServiceError
 from trigpoint_optimisation.core.graph import with_kernel
 from trigpoint_optimisation.core.state import fix_bias_key, landmark_key, pose_key
 from trigpoint_optimisation.settings import FixSettings
@@ -136,9 +137,14 @@ class IncrementalGraph:
         self._guesses.insert(key, pose[:2] + turn @ arm)
 
     def update(self) -> None:
-        """Everything added is solved for."""
+        """Everything added is solved for. Raises ServiceError where it leaves a state undetermined."""
         if self._factors.size() or self._guesses.size():
-            self._solver.update(self._factors, self._guesses)
+            try:
+                self._solver.update(self._factors, self._guesses)
+            except (
+                RuntimeError
+            ) as error:  # gtsam names the state, not the cause; a restart begins from the last version
+                raise ServiceError(f"{self.pose_count} poses cannot be solved for: {error}") from error
             self._factors, self._guesses = gtsam.NonlinearFactorGraph(), gtsam.Values()
 
     def pose(self, drive: int, keyframe: int) -> Floats:

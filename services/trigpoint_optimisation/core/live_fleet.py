@@ -46,11 +46,10 @@ def solved_start(path: TrajectorySolved) -> Start:
 
 @dataclass(slots=True)
 class _Followed:
-    """One drive: what makes its legs, those that may be needed again, the fixes the filter accepted, its start."""
+    """One drive: what makes its legs, those that may be needed again, its start."""
 
     drive: LiveDrive
     legs: list[Leg] = field(default_factory=list)
-    accepted: set[int] = field(default_factory=set)
     start: Start | None = None
 
 
@@ -68,6 +67,7 @@ class LiveFleet:
     ) -> None:
         self._frame, self._settings = frame, settings
         self._followed: dict[DriveName, _Followed] = {}
+        self._accepted: dict[DriveName, set[int]] = {}  # fixes, by the filter
         self._starts = dict(starts or {})
         self.excluded = frozenset(excluded)
         self.map = LiveMap(frame, settings, base=base)
@@ -80,6 +80,8 @@ class LiveFleet:
         for leg in followed.drive.take(row):
             followed.legs.append(leg)
             places += self._lead(name, followed, leg)
+            if not self.map.is_placed(name) and followed.start is None:
+                followed.legs = _still_needed(followed.legs, None)
         return places
 
     def judged(self, verdict: FixJudged) -> None:
@@ -87,10 +89,8 @@ class LiveFleet:
         name = (verdict.vehicle, verdict.boot_id)
         if not verdict.accepted:
             return
-        followed = self._followed.get(name)
-        if followed is not None:
-            followed.accepted.add(verdict.fix_sequence)
-            self.map.judged(name, verdict.fix_sequence)
+        self._accepted.setdefault(name, set()).add(verdict.fix_sequence)  # it may be here before its fix is
+        self.map.judged(name, verdict.fix_sequence)
 
     def begin_anew(
         self,
@@ -104,6 +104,11 @@ class LiveFleet:
         self.excluded = frozenset(excluded)
         starts = {(path.vehicle, path.boot_id): solved_start(path) for path in trajectories if len(path.stamp_ns)}
         newest: dict[DriveName, DrivePlace] = {}
+        going_on = {name[0]: name for name in self._followed}  # a vehicle's newest boot
+        ended = [n for n in self._followed if n in starts and going_on[n[0]] != n]
+        for name in ended:
+            del self._followed[name]
+            self._accepted.pop(name, None)
         for name, followed in self._followed.items():
             followed.start = starts.get(name)
             followed.legs = _still_needed(followed.legs, followed.start)
@@ -136,7 +141,7 @@ class LiveFleet:
             self.map.begin(described, name[1])
         places = self.map.take({name: leg})
         for fix in leg.fixes:
-            if fix.sequence in followed.accepted:
+            if fix.sequence in self._accepted.get(name, ()):
                 self.map.judged(name, fix.sequence)
         return places
 

@@ -37,6 +37,7 @@ CANDIDATES_MOST = 4  # of them, the nearest: the marginals of many are what an u
 RETRIED_EVERY = 5  # keyframes: a track that nothing decides
 FOLLOWED_SIGMA_M = 0.15  # between a vehicle and a landmark it has in sight
 DISAGREEMENT = 25.0  # chi-square of a sighting that is not of its landmark
+UNJUDGED_MOST = 1000  # fixes that wait for their verdict, or were rejected
 STRIKES = 3  # such sightings in a row, and the track is no more of it
 FIX_SPACING_NS = 2_000_000_000  # between fixes in the graph
 FIX_KNOT_NS = 30_000_000_000  # the slow error of fixes is held for so long,
@@ -89,6 +90,10 @@ class LiveMap:
     def knows(self, name: DriveName) -> bool:
         """Whether the drive has begun."""
         return name in self._drives
+
+    def is_placed(self, name: DriveName) -> bool:
+        """Whether the drive has a place."""
+        return name in self._drives and self._drives[name].placed
 
     def judged(self, name: DriveName, fix_sequence: int) -> None:
         """The filter accepted a fix: from now on it holds."""
@@ -148,6 +153,8 @@ class LiveMap:
     def _extend(self, drive: DriveInMap, leg: Leg) -> None:
         for fix in leg.fixes:
             drive.hung[fix.sequence] = leg.keyframe, fix
+        while len(drive.hung) > UNJUDGED_MOST:
+            del drive.hung[next(iter(drive.hung))]
         if drive.placed:
             drive.newest = leg
             self._graph.add_motion(drive.index, leg.keyframe, leg.delta, leg.covariance)
