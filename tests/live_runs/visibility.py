@@ -41,10 +41,10 @@ class Visible:
 
 @dataclass(slots=True)
 class Times:
-    """When the log had everything up to a stamp, and when a row with that newest sweep was committed."""
+    """When the log had everything up to a stamp, and when a landmark's first row was committed, by its newest sweep."""
 
     appended: list[tuple[int, float]] = field(default_factory=list)
-    committed: list[tuple[int, float]] = field(default_factory=list)
+    committed: dict[str, tuple[int, float]] = field(default_factory=dict)
 
 
 class TimedStore(GeoPackageStore):
@@ -57,7 +57,8 @@ class TimedStore(GeoPackageStore):
     def apply_all(self, changes: Sequence[MapChange], checkpoint: Checkpoint) -> None:
         super().apply_all(changes, checkpoint)
         now_s = time.monotonic()
-        self._times.committed += [(row.last_seen_ns, now_s) for change in changes for row in change.opened]
+        for row in (row for change in changes for row in change.opened):
+            self._times.committed.setdefault(row.landmark, (row.last_seen_ns, now_s))
 
 
 def visible_within(folder: Path, *, seconds: float, seed: int = 1) -> Visible:
@@ -116,11 +117,11 @@ def _append_in_time(log: McapLog, campus: Campus, times: Times, *, seconds: floa
 
 
 def _visible(times: Times) -> Visible:
-    """Of every row whose newest sweep came after the warm-up."""
+    """Of every landmark that became one after the warm-up; a row changed later says nothing of a sweep."""
     stamps = np.array([stamp for stamp, _ in times.appended])
     took_s = [
         committed_s - times.appended[int(np.searchsorted(stamps, seen_ns))][1]
-        for seen_ns, committed_s in times.committed
+        for seen_ns, committed_s in times.committed.values()
         if stamps[0] < seen_ns <= stamps[-1]
     ]
     if not took_s:
