@@ -208,6 +208,8 @@ def ingested_stream(*, count: int, seed: int) -> StreamTally:
                 sender.publish_run(run)
             if held == 0 or number % PUBLISHED_BETWEEN_STEPS == 0:
                 _settle(service)
+            if held == 0:
+                service.flush()
         _settle(service)
     return _tally(vehicles, log, sent)
 
