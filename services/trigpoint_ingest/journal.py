@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from trigpoint.bus.ports import Bus
 from trigpoint.errors import EventRejected, FrameRefused
 from trigpoint.events.codec import Event
-from trigpoint.events.envelope import Envelope, EventIdentity
+from trigpoint.events.envelope import EncodedMessage, Envelope, EventIdentity
 from trigpoint.events.keys import STREAM_PATTERNS, stream_of
 from trigpoint.events.observed import EventRefused, MapFramePinned, VehicleDescribed
 from trigpoint.events.runs import EncodedRun
@@ -18,7 +18,7 @@ from trigpoint.logs.readings import pinned_frame
 from trigpoint.observability.metrics import Instruments
 from trigpoint_ingest.commit import Group, GroupCommit, Row
 from trigpoint_ingest.core.framing import frame_pinned_by
-from trigpoint_ingest.core.messages import RawMessage, messages_of
+from trigpoint_ingest.core.messages import messages_of
 from trigpoint_ingest.core.plain_payloads import FIX_SCHEMA, PlainPayloads
 from trigpoint_ingest.core.refusal import refusal_of, refused_identity
 from trigpoint_ingest.core.tally import Tally
@@ -55,7 +55,7 @@ class Journal:
         self._refused_number = log.next_number(REFUSED_STREAM)
         self._frame_pinned = pinned_frame(log) is not None
 
-    def take(self, message: RawMessage) -> None:
+    def take(self, message: EncodedMessage) -> None:
         """The message admitted, counted as a duplicate, or refused and kept with its reason."""
         vehicle = message.identity.source
         try:
@@ -106,7 +106,7 @@ class Journal:
             self._frame_pinned = True
             self._add(MAP_STREAM, Envelope(FRAME_IDENTITY, stamp_ns, pinned), 0)
 
-    def refuse(self, message: RawMessage, error: EventRejected) -> None:
+    def refuse(self, message: EncodedMessage, error: EventRejected) -> None:
         """The message counted by its reason, and kept if it was not refused before."""
         self.tally.refused[message.identity.source, error.reason] += 1
         self._instruments.rejected.labels(message.identity.source, error.reason).inc()

@@ -12,13 +12,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol, Self, get_args
+from typing import Self, get_args
 
 from trigpoint.bus.ports import Bus
 from trigpoint.bus.zenoh_bus import ZenohSettings
 from trigpoint.errors import EventRejected, InputError, ServiceError
 from trigpoint.events.codec import encode
-from trigpoint.events.envelope import EventIdentity
+from trigpoint.events.envelope import EncodedMessage, EventIdentity
 from trigpoint.events.keys import valid_name
 from trigpoint.events.observed import Observed, VehicleDescribed
 from trigpoint_vehicle.core.spool_records import SpoolChannel
@@ -32,26 +32,6 @@ IDLE_S = 0.2  # between two looks of a publisher that has nothing to do
 CLOSE_LONGEST_S = 15.0  # a session that is stalled holds a publication for 5 s before it gives up
 
 logger = logging.getLogger(__name__)
-
-
-class RecordedMessage(Protocol):
-    """A message somebody numbered before, as a vehicle's log holds it."""
-
-    @property
-    def schema_name(self) -> str:
-        """The full name of the payload's Protobuf message."""
-
-    @property
-    def payload(self) -> bytes:
-        """The Protobuf bytes."""
-
-    @property
-    def identity(self) -> EventIdentity:
-        """Who says it, as which of theirs."""
-
-    @property
-    def stamp_ns(self) -> int:
-        """When it was measured, integer nanoseconds since the Unix epoch."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,7 +120,7 @@ class VehiclePublisher:
         self._wake_up()
         return EventIdentity(self.vehicle, self.boot_id, sequence)
 
-    def forward(self, message: RecordedMessage) -> None:
+    def forward(self, message: EncodedMessage) -> None:
         """A message of a log of this vehicle, spooled and sent under the identity it has.
 
         Raises InputError for another vehicle's, and as `send` does.

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from trigpoint.events.drives import DetectionSeries, Drive, FixSeries, ImuSeries, WheelSeries
+from trigpoint.events.drives import NO_DETECTIONS, Drive, FixSeries, ImuSeries, WheelSeries
 from trigpoint.events.observed import VehicleDescribed
 from trigpoint.geodesy.poses import transform_points
 from trigpoint.geodesy.positions import GridPosition
@@ -18,15 +18,6 @@ START_NS = 1_700_000_000_000_000_000
 STEP_S = 0.1  # of wheels and IMU
 WHEELBASE_M = 2.5
 ANTENNA_M = np.array([1.5, 0.4])
-NO_DETECTIONS = DetectionSeries(
-    stamp_ns=np.zeros(0, dtype=np.int64),
-    range_m=np.zeros(0),
-    bearing_rad=np.zeros(0),
-    diameter_m=np.zeros(0),
-    kind=(),
-    signature=(),
-    sequence=np.zeros(0, dtype=np.int64),
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -27,6 +27,7 @@ from trigpoint_vehicle.core.campus_settings import CampusSettings
 
 STEP_S = 0.1  # appended together
 WARM_UP_S = 100.0  # taken in at once: the drive has found its place then
+CATCHING_UP_S = 20.0  # the warm-up is taken in by then
 NO_WHOLE_SOLVES = SolveSettings(live=LiveSettings(settle_s=1e9, solve_interval_s=1e9, correction_delay_s=1e9))
 
 
@@ -105,8 +106,8 @@ def _append_in_time(log: McapLog, campus: Campus, times: Times, *, seconds: floa
     stamps = np.array([row.stamp_ns for row in rows])
     at = int(np.searchsorted(stamps, stamps[0] + WARM_UP_S * 1e9))
     log.append(stream, rows[:at])
-    began_s, first_ns = time.monotonic() + 20.0, int(stamps[at])  # so long the warm-up may take
-    time.sleep(20.0)
+    began_s, first_ns = time.monotonic() + CATCHING_UP_S, int(stamps[at])
+    time.sleep(CATCHING_UP_S)
     for step in range(1, round(seconds / STEP_S) + 1):
         time.sleep(max(0.0, began_s + step * STEP_S - time.monotonic()))
         end = int(np.searchsorted(stamps, first_ns + step * STEP_S * 1e9))

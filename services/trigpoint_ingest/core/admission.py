@@ -5,11 +5,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from trigpoint.events.codec import event_class
-from trigpoint.events.envelope import Envelope, EventIdentity
+from trigpoint.events.envelope import EncodedMessage, Envelope, EventIdentity
 from trigpoint.events.observed import Observed, VehicleDescribed
 from trigpoint.events.runs import EncodedRun, Integers
 from trigpoint.events.seen import SeenSequences
-from trigpoint_ingest.core.messages import RawMessage
 from trigpoint_ingest.core.stamps import DriveStamps, StampLimits, stamps_fit
 from trigpoint_ingest.core.validation import Drive, drive_of, validate
 
@@ -35,7 +34,7 @@ class Admission:
         self._heard: set[Drive] = set()  # of which nothing was accepted yet
         self._stamps: dict[Drive, DriveStamps] = {}
 
-    def admit(self, message: RawMessage) -> Envelope[Observed] | None:
+    def admit(self, message: EncodedMessage) -> Envelope[Observed] | None:
         """The event to be logged, or None for a duplicate. Raises EventRejected.
 
         A message refused once is looked at afresh when it comes again: what was wrong may have been mended.

@@ -7,15 +7,15 @@ from typing import TypeVar
 import numpy as np
 
 from trigpoint.events.codec import schema_name
+from trigpoint.events.envelope import EncodedMessage
 from trigpoint.events.observed import VehicleDescribed
 from trigpoint.events.runs import EncodedRun, Integers, joined
-from trigpoint_ingest.core.messages import RawMessage
 from trigpoint_ingest.core.validation import Drive, drive_of
 
 DESCRIPTION_SCHEMA = schema_name(VehicleDescribed)
 HELD_LIMIT = 10_000  # messages of a file that may stand before their drive's description
 
-MessageT = TypeVar("MessageT", bound=RawMessage)
+MessageT = TypeVar("MessageT", bound=EncodedMessage)
 
 
 def described_first(messages: Iterable[MessageT]) -> Iterator[tuple[MessageT, bool]]:

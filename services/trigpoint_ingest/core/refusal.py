@@ -1,10 +1,9 @@
 """A refused message as an event of its own: kept with its reason, named after the message it was."""
 
 from trigpoint.errors import EventRejected
-from trigpoint.events.envelope import Envelope, EventIdentity
+from trigpoint.events.envelope import EncodedMessage, Envelope, EventIdentity
 from trigpoint.events.observed import EventRefused
 from trigpoint_ingest.core.limits import TEXT_LIMIT
-from trigpoint_ingest.core.messages import RawMessage
 from trigpoint_ingest.core.stamps import STAMP_LIMIT_NS
 from trigpoint_ingest.core.validation import SEQUENCE_LIMIT
 
@@ -12,7 +11,9 @@ REFUSING_SOURCE = "ingest"
 SEPARATOR = "/"  # no vehicle's name holds one
 
 
-def refusal_of(message: RawMessage, error: EventRejected, *, payload_limit: int, number: int) -> Envelope[EventRefused]:
+def refusal_of(
+    message: EncodedMessage, error: EventRejected, *, payload_limit: int, number: int
+) -> Envelope[EventRefused]:
     """The refusal, with up to `payload_limit` bytes of the payload.
 
     Its identity is made of the message's, so that the same message refused again is the same refusal, and the

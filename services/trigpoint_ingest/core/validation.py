@@ -4,11 +4,10 @@ from typing import get_args
 
 from trigpoint.errors import EventRejected, InputError
 from trigpoint.events.codec import decode
-from trigpoint.events.envelope import Envelope, EventIdentity
+from trigpoint.events.envelope import EncodedMessage, Envelope, EventIdentity
 from trigpoint.events.keys import valid_name
 from trigpoint.events.observed import Observed, VehicleDescribed
 from trigpoint_ingest.core.limits import TEXT_LIMIT, within_limits
-from trigpoint_ingest.core.messages import RawMessage
 from trigpoint_ingest.core.stamps import DriveStamps, StampLimits, require_stamp
 
 OBSERVED: frozenset[type] = frozenset(get_args(Observed))
@@ -28,7 +27,7 @@ def drive_of(identity: EventIdentity) -> Drive:
 
 
 def validate(
-    message: RawMessage, *, described: bool, stamps: DriveStamps, limits: StampLimits, fleet: frozenset[str] | None
+    message: EncodedMessage, *, described: bool, stamps: DriveStamps, limits: StampLimits, fleet: frozenset[str] | None
 ) -> Envelope[Observed]:
     """The event a message holds, if it may enter the log.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trigpoint.events.drives import DetectionSeries, Drive, FixSeries, ImuSeries, WheelSeries
+from trigpoint.events.drives import NO_DETECTIONS, NO_FIXES, Drive, ImuSeries, WheelSeries
 from trigpoint.events.envelope import Envelope
 from trigpoint.events.observed import (
     GnssFixReceived,
@@ -43,22 +43,6 @@ REORDER_NS = 200_000_000  # an event may arrive this much behind a later one and
 STANDING_NS = 1_000_000_000  # a standing vehicle has a keyframe after so long,
 STANDING_KEYFRAMES = 3  # and so many in a row: what it sees again and again says nothing new
 STILL_M = 1e-3  # per keyframe
-NO_FIXES = FixSeries(
-    stamp_ns=np.zeros(0, dtype=np.int64),
-    lat_deg=np.zeros(0),
-    lon_deg=np.zeros(0),
-    sigma_m=np.zeros(0),
-    sequence=np.zeros(0, dtype=np.int64),
-)
-NO_DETECTIONS = DetectionSeries(
-    stamp_ns=np.zeros(0, dtype=np.int64),
-    range_m=np.zeros(0),
-    bearing_rad=np.zeros(0),
-    diameter_m=np.zeros(0),
-    kind=(),
-    signature=(),
-    sequence=np.zeros(0, dtype=np.int64),
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

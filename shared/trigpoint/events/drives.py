@@ -67,6 +67,24 @@ class DetectionSeries:
     sequence: Ints
 
 
+NO_FIXES = FixSeries(
+    stamp_ns=np.zeros(0, dtype=np.int64),
+    lat_deg=np.zeros(0),
+    lon_deg=np.zeros(0),
+    sigma_m=np.zeros(0),
+    sequence=np.zeros(0, dtype=np.int64),
+)
+NO_DETECTIONS = DetectionSeries(
+    stamp_ns=np.zeros(0, dtype=np.int64),
+    range_m=np.zeros(0),
+    bearing_rad=np.zeros(0),
+    diameter_m=np.zeros(0),
+    kind=(),
+    signature=(),
+    sequence=np.zeros(0, dtype=np.int64),
+)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
     """Everything one vehicle measured in one boot. Each series is sorted by time, not by arrival."""

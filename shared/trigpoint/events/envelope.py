@@ -1,7 +1,7 @@
 """What every event carries besides its content: who said it, as which of theirs, and when it was measured."""
 
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 EventT = TypeVar("EventT", covariant=True)
 
@@ -34,3 +34,24 @@ class LogPosition:
 
     stream: str
     number: int
+
+
+class EncodedMessage(Protocol):
+    """A message as its sender numbered it, from the bus, a file or a program: payload in the Protobuf schema
+    `schema_name`, with what its sender says of it; nobody has looked whether that is true."""
+
+    @property
+    def schema_name(self) -> str:
+        """The full name of the payload's Protobuf message."""
+
+    @property
+    def payload(self) -> bytes:
+        """The Protobuf bytes."""
+
+    @property
+    def identity(self) -> EventIdentity:
+        """Who says it, as which of theirs."""
+
+    @property
+    def stamp_ns(self) -> int:
+        """When it was measured, integer nanoseconds since the Unix epoch."""

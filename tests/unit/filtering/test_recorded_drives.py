@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from driven_paths.examples import NO_DETECTIONS, chosen_fixes
-from trigpoint.events.drives import Drive, FixSeries, ImuSeries, WheelSeries
+from driven_paths.examples import chosen_fixes
+from trigpoint.events.drives import NO_DETECTIONS, Drive, FixSeries, ImuSeries, WheelSeries
 from trigpoint.events.observed import VehicleDescribed
 from trigpoint.geodesy.poses import transform_points
 from trigpoint.geodesy.positions import GridPosition
