@@ -4,9 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import cast
 
+from trigpoint.events.envelope import Envelope
 from trigpoint.events.keys import STREAM_PATTERNS
-from trigpoint.events.mapped import LandmarkSolved, MapSolved, OdometryCorrected, TrajectorySolved
+from trigpoint.events.mapped import LandmarkSolved, Mapped, MapSolved, OdometryCorrected, TrajectorySolved
 from trigpoint.events.observed import VehicleDescribed
+from trigpoint.events.solved import closed_versions
 from trigpoint.logs.ports import EventLog, LoggedEvent
 from trigpoint.logs.readings import VERDICT_STREAM, vehicle_streams
 from trigpoint_optimisation.app import STREAM
@@ -44,11 +46,9 @@ def resumed(log: EventLog) -> Resumed:
     _, stamp_ns, newest = heads[-1]
     whole = max((row for row in heads if not row[2].base_version), key=lambda row: row[0], default=heads[0])
     before = max((number for number, _, _ in heads if number < whole[0]), default=-1)
-    landmarks, paths = _parts(
-        log, before + 1, {head.map_version: head for number, _, head in heads if number >= whole[0]}
-    )
+    landmarks, paths = _parts(log, before + 1)
     said = _corrections(log)
-    starts = {(path.vehicle, path.boot_id): solved_start(path) for path in paths if len(path.stamp_ns)}
+    starts = {name: solved_start(path) for name, path in paths.items() if len(path.stamp_ns)}
     for name, (said_ns, event) in said.items():
         if name not in starts or said_ns > starts[name].stamp_ns:
             starts[name] = corrected_start(said_ns, event)
@@ -69,24 +69,18 @@ def _heads(log: EventLog) -> list[LoggedEvent]:
     return list(log.read(STREAM, kinds=(MapSolved,)))
 
 
-def _parts(
-    log: EventLog, first_number: int, heads: Mapping[int, MapSolved]
-) -> tuple[dict[str, LandmarkSolved], list[TrajectorySolved]]:
-    """The landmarks of the newest version and the paths of the newest whole one."""
-    parts: dict[int, list[LandmarkSolved]] = {}
-    paths: dict[DriveName, TrajectorySolved] = {}
-    for row in log.read(STREAM, first_number=first_number, kinds=(LandmarkSolved, TrajectorySolved)):
-        event = row.envelope.event
-        if isinstance(event, LandmarkSolved):
-            parts.setdefault(event.map_version, []).append(event)
-        elif isinstance(event, TrajectorySolved) and event.map_version in heads:
-            paths[event.vehicle, event.boot_id] = event
+def _parts(log: EventLog, first_number: int) -> tuple[dict[str, LandmarkSolved], dict[DriveName, TrajectorySolved]]:
+    """The landmarks of the newest version and the paths of the newest whole one, whose first event has this number."""
     landmarks: dict[str, LandmarkSolved] = {}
-    for version, head in sorted(heads.items()):
-        landmarks |= {event.landmark: event for event in parts.get(version, [])}
+    paths: dict[DriveName, TrajectorySolved] = {}
+    kinds = (LandmarkSolved, TrajectorySolved, MapSolved)
+    rows = (cast(Envelope[Mapped], row.envelope) for row in log.read(STREAM, first_number=first_number, kinds=kinds))
+    for head, events in closed_versions(rows):
+        landmarks |= {event.landmark: event for event in events if isinstance(event, LandmarkSolved)}
+        paths |= {(event.vehicle, event.boot_id): event for event in events if isinstance(event, TrajectorySolved)}
         for name in head.removed:
             landmarks.pop(name, None)
-    return landmarks, list(paths.values())
+    return landmarks, paths
 
 
 def _corrections(log: EventLog) -> dict[DriveName, tuple[int, OdometryCorrected]]:

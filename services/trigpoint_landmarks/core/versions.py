@@ -15,6 +15,7 @@ from trigpoint.events.mapped import (
     MapSolved,
     TrajectorySolved,
 )
+from trigpoint.events.solved import own_events
 
 T = TypeVar("T", TrajectorySolved, LandmarkSolved, AnchorAssociated, ImageOffsetSolved)
 Logged = tuple[LogPosition, Envelope[Mapped]]
@@ -107,10 +108,7 @@ def _infinity_of(landmarks: Sequence[LandmarkSolved]) -> str:
 def _closed(
     position: LogPosition, closing: Envelope[Mapped], solved: MapSolved, pending: list[Envelope[Mapped]]
 ) -> SolvedVersion:
-    writer = (closing.identity.source, closing.identity.boot_id, solved.map_version)
-    events = [
-        row.event for row in pending if (row.identity.source, row.identity.boot_id, row.event.map_version) == writer
-    ]
+    events = own_events(closing, pending)
     return SolvedVersion(
         position=position,
         stamp_ns=closing.stamp_ns,

@@ -1,11 +1,12 @@
 """One whole map version as a value: what the optimiser returns, and what a log's mapped events fold back into."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trigpoint.events.envelope import Envelope
 from trigpoint.events.mapped import (
     AnchorAssociated,
     ImageOffsetSolved,
@@ -56,6 +57,26 @@ class LabelReduction:
     image_index: Ints
     images: tuple[str, ...]
     image_sigma_m: Floats
+
+
+def own_events(closing: Envelope[Mapped], pending: Iterable[Envelope[Mapped]]) -> tuple[Mapped, ...]:
+    """Of the events since the last MapSolved those of the version this one closes: of its number, from the same boot of
+    the writer. The others are what a solve left whose writing was cut off; its number is given anew."""
+    writer = (closing.identity.source, closing.identity.boot_id, closing.event.map_version)
+    return tuple(
+        row.event for row in pending if (row.identity.source, row.identity.boot_id, row.event.map_version) == writer
+    )
+
+
+def closed_versions(rows: Iterable[Envelope[Mapped]]) -> Iterator[tuple[MapSolved, tuple[Mapped, ...]]]:
+    """The head and the other events of each complete version, in the order of the log."""
+    pending: list[Envelope[Mapped]] = []
+    for row in rows:
+        if isinstance(row.event, MapSolved):
+            yield row.event, own_events(row, pending)
+            pending = []
+        else:
+            pending.append(row)
 
 
 def solved_maps(events: Iterable[Mapped]) -> tuple[SolvedMap, ...]:

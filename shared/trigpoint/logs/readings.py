@@ -11,7 +11,7 @@ from trigpoint.events.estimated import FixJudged
 from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.mapped import Mapped, MapSolved
 from trigpoint.events.observed import MapFramePinned, Observed, VehicleDescribed
-from trigpoint.events.solved import SolvedMap, solved_maps
+from trigpoint.events.solved import SolvedMap, closed_versions, solved_maps
 from trigpoint.geodesy.positions import GridPosition
 from trigpoint.geodesy.projection import MapFrame, pin_map_frame
 from trigpoint.logs.ports import EventLog
@@ -88,4 +88,5 @@ def logged_verdicts(log: EventLog) -> tuple[FixJudged, ...]:
 
 def logged_maps(log: EventLog) -> tuple[SolvedMap, ...]:
     """Every complete map version, oldest first."""
-    return solved_maps(cast(Mapped, row.envelope.event) for row in log.read(MAPPED_STREAM))
+    rows = (cast(Envelope[Mapped], row.envelope) for row in log.read(MAPPED_STREAM))
+    return solved_maps(event for head, parts in closed_versions(rows) for event in (*parts, head))

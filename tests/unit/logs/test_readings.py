@@ -3,12 +3,13 @@
 import pytest
 
 from event_examples.rows import START_NS, imu_row
-from landmark_maps.examples import label
+from landmark_maps.examples import append_mapped, label, solved_landmark, solved_map
 from trigpoint.errors import InputError
 from trigpoint.events.corrected import AnchorRetracted, Corrected, DriveExcluded, DriveIncluded
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.logs.memory_log import MemoryLog
-from trigpoint.logs.readings import logged_anchors, logged_drives
+from trigpoint.logs.readings import logged_anchors, logged_drives, logged_maps
+from trigpoint_optimisation.resuming import resumed
 
 
 def _log_of(*corrections: Corrected) -> MemoryLog:
@@ -57,3 +58,14 @@ def test_where_every_drive_is_excluded_it_is_said_how_many() -> None:
     log = _two_drives(_excluded("boot-1"), _excluded("boot-2"))
     with pytest.raises(InputError, match="all of the log's 2 drives are excluded"):
         logged_drives(log)
+
+
+def test_what_a_solve_left_that_was_cut_off_is_in_no_map_version() -> None:
+    log = MemoryLog()
+    append_mapped(log, solved_map(1, [solved_landmark("L1", 1.0, 0.0)]))
+    cut_off = solved_map(2, [solved_landmark(name, 2.0, 0.0, map_version=2) for name in ("L1", "ghost")])
+    append_mapped(log, cut_off[:3], boot_id="killed")
+    append_mapped(log, solved_map(2, [solved_landmark("L1", 3.0, 0.0, map_version=2)]), boot_id="boot-2")
+    _, newest = logged_maps(log)
+    assert [(one.landmark, one.position_m[0]) for one in newest.landmarks] == [("L1", 3.0)]
+    assert list(resumed(log).landmarks) == list(newest.landmarks)
