@@ -153,12 +153,13 @@ def end_whole(path: Path) -> None:
             end = chunk.offset + chunk.length
             record = parsed(Chunk, content.read(chunk.offset + FRAME.size, end))
             packed = PackedChunk(record, message_indexes(chunk.data))
-            tail = index.add_chunk(packed, chunk.offset)[chunk.length :]
+            length, data = index.add_chunk(packed, chunk.offset)
+            tail = data[length:]
         index.schemas, index.channels, index.metadata = scan.schemas, scan.channel_records, scan.metadata_indexes
         _rewrite_end(path, end, tail, index)
     again = McapScan(path)
     count = sum(1 for _ in again.chunks())
-    if again.damages or count != len(index.chunks):
+    if again.damages or count != index.chunk_count:
         raise LogDamaged(f"{path}: still damaged after its end was written anew: {again.damages}")
 
 

@@ -2,7 +2,7 @@
 
 import struct
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Protocol
@@ -54,16 +54,21 @@ class WrittenChunk:
 
 @dataclass(slots=True)
 class FileIndex:
-    """What the summary at the end of a file says of it; grows while the file does."""
+    """What the summary at the end of a file says of it; grows while the file does, by some hundred bytes a chunk:
+    `chunk_indexes` are records as they will stand there."""
 
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
-    chunks: list[ChunkIndex] = field(default_factory=list)
+    chunk_indexes: bytearray = field(default_factory=bytearray)
+    chunk_count: int = 0
+    start_ns: int = 0  # of the earliest message, 0 before there is one
+    end_ns: int = 0
     metadata: list[MetadataIndex] = field(default_factory=list)
     count_by_channel: dict[int, int] = field(default_factory=dict)
 
-    def add_chunk(self, packed: PackedChunk, offset: int) -> bytes:
-        """The bytes of a chunk at this offset and of its message indexes, entered into the index."""
+    def add_chunk(self, packed: PackedChunk, offset: int) -> tuple[int, bytes]:
+        """The length of a chunk at this offset, and the bytes of it and of its message indexes, entered into the
+        index."""
         chunk, tail, index_offsets = record_bytes(packed.record), [], {}
         position = offset + len(chunk)
         for channel_id, entries in packed.index_by_channel.items():
@@ -71,16 +76,20 @@ class FileIndex:
             index_offsets[channel_id] = position
             position += len(tail[-1])
             self.count_by_channel[channel_id] = self.count_by_channel.get(channel_id, 0) + len(entries)
-        self.chunks.append(_chunk_index(packed, offset, len(chunk), index_offsets, position - offset - len(chunk)))
-        return b"".join([chunk, *tail])
+        index_length = position - offset - len(chunk)
+        self.chunk_indexes += record_bytes(_chunk_index(packed, offset, len(chunk), index_offsets, index_length))
+        start_ns, end_ns = packed.record.message_start_time, packed.record.message_end_time
+        self.start_ns = min(self.start_ns, start_ns) if self.chunk_count else start_ns
+        self.end_ns = max(self.end_ns, end_ns)
+        self.chunk_count += 1
+        return len(chunk), b"".join([chunk, *tail])
 
     def ending(self, *, offset: int, data_crc: int) -> bytes:
         """Everything that ends a file whose data section ends at `offset` with this checksum."""
         data_end = record_bytes(DataEnd(data_section_crc=data_crc))
         summary_start = offset + len(data_end)
         summary, groups = b"", b""
-        for opcode, records in self._groups():
-            group = b"".join(record_bytes(record) for record in records)
+        for opcode, group in self._groups():
             if group:
                 start = summary_start + len(summary)
                 groups += record_bytes(SummaryOffset(group_opcode=opcode, group_start=start, group_length=len(group)))
@@ -91,25 +100,29 @@ class FileIndex:
         footer = record_bytes(Footer(summary_start, offsets_start, checksum))
         return data_end + summary + groups + footer + bytes(MCAP0_MAGIC)
 
-    def _groups(self) -> Iterator[tuple[Opcode, Sequence[McapRecord]]]:
-        yield Opcode.SCHEMA, list(self.schemas.values())
-        yield Opcode.CHANNEL, list(self.channels.values())
-        yield Opcode.STATISTICS, [self._statistics()]
-        yield Opcode.CHUNK_INDEX, self.chunks
-        yield Opcode.METADATA_INDEX, self.metadata
+    def _groups(self) -> Iterator[tuple[Opcode, bytes]]:
+        yield Opcode.SCHEMA, _records_bytes(self.schemas.values())
+        yield Opcode.CHANNEL, _records_bytes(self.channels.values())
+        yield Opcode.STATISTICS, record_bytes(self._statistics())
+        yield Opcode.CHUNK_INDEX, bytes(self.chunk_indexes)
+        yield Opcode.METADATA_INDEX, _records_bytes(self.metadata)
 
     def _statistics(self) -> Statistics:
         return Statistics(
             attachment_count=0,
             channel_count=len(self.channels),
             channel_message_counts=dict(sorted(self.count_by_channel.items())),
-            chunk_count=len(self.chunks),
+            chunk_count=self.chunk_count,
             message_count=sum(self.count_by_channel.values()),
-            message_end_time=max((chunk.message_end_time for chunk in self.chunks), default=0),
-            message_start_time=min((chunk.message_start_time for chunk in self.chunks), default=0),
+            message_end_time=self.end_ns,
+            message_start_time=self.start_ns,
             metadata_count=len(self.metadata),
             schema_count=len(self.schemas),
         )
+
+
+def _records_bytes(records: Iterable[McapRecord]) -> bytes:
+    return b"".join(record_bytes(record) for record in records)
 
 
 def _chunk_index(
@@ -184,10 +197,11 @@ class McapFileWriter:
             key = rows.channels[number]
             id_of_channel[number] = self._channel_ids.get(key) or self._add_channel(key, builder)
         packed, offset = pack(rows, id_of_channel[rows.channel_of_row], built(builder)), self._position
-        self._write(self._index.add_chunk(packed, offset))
+        length, data = self._index.add_chunk(packed, offset)
+        self._write(data)
         return WrittenChunk(
             offset=offset,
-            length=self._index.chunks[-1].chunk_length,
+            length=length,
             count=packed.count,
             start_ns=packed.record.message_start_time,
             end_ns=packed.record.message_end_time,
