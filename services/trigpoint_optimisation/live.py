@@ -130,7 +130,8 @@ class LiveOptimisation:
         return True
 
     def _go_on_from(self, state: Resumed) -> None:
-        self._version, self._anchor_count = state.version, state.anchor_count
+        self._version, self._version_inputs = state.version, dict(state.inputs)
+        self._anchor_count = state.anchor_count
         self._solved_inputs, self._tried_inputs = state.whole_inputs, state.whole_inputs
         self._said_ns = dict(state.said_ns)
         self._boots: dict[DriveName, tuple[str, int]] = {}
@@ -203,9 +204,12 @@ class LiveOptimisation:
             self._append_version((*changed, head), stamp_ns=self._newest_ns)
 
     def _positions(self) -> tuple[tuple[str, int], ...]:
-        """How far each stream is taken in."""
+        """How far each stream is taken in, by the version before or since."""
         at = {**self._measured.checkpoint, **self._judged.checkpoint, **self._corrected.checkpoint}
-        return tuple((stream, at.get(stream, number)) for stream, number in input_positions(self._log))
+        return tuple(
+            (stream, max(at.get(stream, number), self._version_inputs.get(stream, 0)))
+            for stream, number in input_positions(self._log)
+        )
 
     def _append_version(self, events: Sequence[Mapped], *, stamp_ns: int) -> None:
         version = self._version + 1
@@ -213,7 +217,7 @@ class LiveOptimisation:
         head = cast(MapSolved, numbered[-1])
         boot_id = boot_id_of(version, head.inputs, self._settings)
         self._say(STREAM, envelopes(numbered, boot_id=boot_id, stamp_ns=stamp_ns))
-        self._version = version
+        self._version, self._version_inputs = version, dict(head.inputs)
         self._instruments.map_version.set(version)
 
     def _say(self, stream: str, rows: Sequence[Envelope[Event]]) -> None:

@@ -22,13 +22,14 @@ DriveName = tuple[str, str]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Resumed:
-    """The newest map version (0: none) with its landmarks and its newest measurement, the inputs of the newest whole
-    solve, where drives were and until when they were told so, and the numbers to read on from."""
+    """The newest map version (0: none) with its landmarks, its inputs and its newest measurement, the inputs of the
+    newest whole solve, where drives were and until when they were told so, and the numbers to read on from."""
 
     version: int = 0
     landmarks: tuple[LandmarkSolved, ...] = ()
     anchor_count: int = 0
     stamp_ns: int = 0
+    inputs: tuple[tuple[str, int], ...] = ()
     whole_inputs: tuple[tuple[str, int], ...] = ()
     starts: Mapping[DriveName, Start] = field(default_factory=dict)
     said_ns: Mapping[DriveName, int] = field(default_factory=dict)
@@ -57,6 +58,7 @@ def resumed(log: EventLog) -> Resumed:
         landmarks=tuple(landmarks.values()),
         anchor_count=newest.anchor_count,
         stamp_ns=stamp_ns,
+        inputs=newest.inputs,
         whole_inputs=() if whole[2].method == "incremental" else whole[2].inputs,
         starts=starts,
         said_ns={name: said_ns for name, (said_ns, _) in said.items()},

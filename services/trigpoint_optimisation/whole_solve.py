@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import threading
 import time
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
@@ -16,6 +17,8 @@ from trigpoint.logs.readings import logged_anchors, logged_drives, logged_frame,
 from trigpoint_optimisation.app import input_positions, last_seen_ns
 from trigpoint_optimisation.core.solve import solve_map
 from trigpoint_optimisation.settings import SolveSettings
+
+ASKER_GONE = 1  # exit status
 
 Inputs = tuple[tuple[str, int], ...]
 
@@ -134,6 +137,7 @@ class SolverProcess:
 
 def _solve_for(directory: Path, settings: SolveSettings, answers: Connection) -> None:
     """The log in a directory solved, and said."""
+    threading.Thread(target=_end_with_whoever_asked, name="end-with-parent", daemon=True).start()
     os.nice(settings.live.solver_niceness)
     log = McapLog(directory)
     try:
@@ -142,3 +146,11 @@ def _solve_for(directory: Path, settings: SolveSettings, answers: Connection) ->
         log.close()
     with answers:
         answers.send(found)
+
+
+def _end_with_whoever_asked() -> None:
+    """This process ended once the one that began it is gone, killed perhaps: nobody waits for the solve then."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(ASKER_GONE)
