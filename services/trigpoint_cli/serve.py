@@ -61,7 +61,8 @@ def run_process(process: str, settings: Settings, *, until_input_ends: bool) -> 
     with stop_requests(with_standard_input=until_input_ends) as requests, _spans(process, settings) as spans:
         instruments = Instruments(process, heard=spans)
         opener: Opener = importlib.import_module(f"trigpoint_cli.serving.{process}").opened
-        served = ServedService(lambda: opener(settings, instruments), instruments)
+        limit_s = settings.serve.silence_limit_s
+        served = ServedService(lambda: opener(settings, instruments), instruments, silence_limit_s=limit_s)
         reason = serve_until_stopped(served, settings, requests)
     logger.info("stopped", extra={"reason": reason})
     return Ran(process=process, reason=reason)
@@ -83,6 +84,7 @@ def serve_until_stopped(served: ServedService, settings: Settings, requests: Sto
         served.start()
         while served.is_alive() and reason is None:
             reason = requests.wait(LOOK_S)
+            served.look()
         if reason is not None:
             _stop(served, reason, settings.serve.stop_limit_s)
     if served.error is not None:

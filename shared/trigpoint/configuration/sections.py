@@ -132,6 +132,9 @@ class UpSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServeSettings:
-    """A service told to stop has `stop_limit_s` to finish what it began; then its process ends all the same."""
+    """A service told to stop has `stop_limit_s` to finish what it began; then its process ends all the same. One whose
+    loop has not come round for `silence_limit_s` is not healthy: longer than any single piece of its work takes.
+    """
 
     stop_limit_s: Seconds = 10.0
+    silence_limit_s: Seconds = 120.0

@@ -1,8 +1,12 @@
 """One service at work in a thread of its own."""
 
+import logging
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+
+import pytest
 
 from trigpoint.errors import AppendFailed
 from trigpoint.observability.metrics import Instruments
@@ -31,12 +35,12 @@ class Work:
         self.closed = True
 
 
-def served(work: Work) -> ServedService:
+def served(work: Work, now_s: Callable[[], float] = time.monotonic) -> ServedService:
     @contextmanager
     def opened() -> Iterator[Service]:
         yield work
 
-    service = ServedService(opened, Instruments("work"))
+    service = ServedService(opened, Instruments("work"), silence_limit_s=60.0, now_s=now_s)
     service.start()
     assert work.runs.wait(SOON_S)
     return service
@@ -78,3 +82,36 @@ def test_a_service_that_cannot_go_on_is_not_alive_and_its_error_is_told_without_
     alive, told = service.alive()
     assert (alive, told["stage"], told["error"]) == (False, "failed", "postgresql://me:***@host: no space left")
     assert service.error is error
+
+
+class Clock:
+    """A clock that is put forward by hand."""
+
+    def __init__(self) -> None:
+        self.time_s = 0.0
+
+    def __call__(self) -> float:
+        return self.time_s
+
+
+def test_a_service_whose_loop_does_not_come_round_is_not_alive_and_that_is_said_once(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    work, clock = Work(stubborn=True), Clock()
+    service = served(work, clock)
+    clock.time_s = 61.0
+    service.look()
+    service.look()
+    alive, told = service.alive()
+    assert (alive, told["error"]) == (False, "its loop last came round 61 s ago, limit 60 s")
+    assert [record.levelno for record in caplog.records] == [logging.ERROR]
+    work.let_go.set()
+    assert service.stop(SOON_S)
+
+
+def test_a_service_that_waits_for_news_is_alive_however_long() -> None:
+    clock = Clock()
+    service = served(Work(), clock)
+    clock.time_s = SOON_S + 59.0  # it may wait for SOON_S, and be silent for 60 s after that
+    assert service.alive()[0]
+    assert service.stop(SOON_S)
