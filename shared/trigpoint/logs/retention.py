@@ -1,10 +1,12 @@
 """Which sealed files of a log may go, and their going: recorded first, so that a log never just lacks something."""
 
-from collections.abc import Iterable, Mapping, Sequence
+import fcntl
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from trigpoint.errors import LogDamaged
+from trigpoint.errors import InputError, LogDamaged
 from trigpoint.events.corrected import AnchorLabelled
 from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.mapped import MapSolved
@@ -20,6 +22,7 @@ from trigpoint.logs.seals import is_sealed, seal_fault, seal_path
 
 FRAME_STREAM, CORRECTION_STREAM = STREAM_PATTERNS[MapFramePinned], STREAM_PATTERNS[AnchorLabelled]
 MAP_STREAM = STREAM_PATTERNS[MapSolved]
+LOCK_NAME = ".retention-lock"  # in a log's directory, held by whoever takes files away
 
 Checkpoints = Mapping[str, Mapping[str, int]]  # by reader: by stream the next number it has to read
 
@@ -201,10 +204,23 @@ def _oldest_needed(versions: Sequence[tuple[MapSolved, int]]) -> int:
 def remove_files(directory: Path, files: Sequence[LogFile]) -> None:
     """The files recorded as retained away, then taken away, stream by stream.
 
-    Raises LogDamaged, before anything of its stream is gone, for a file that is not what was sealed; OSError.
+    Raises LogDamaged, before anything of its stream is gone, for a file that is not what was sealed; InputError while
+    another process takes files away, OSError.
     """
-    for stream in dict.fromkeys(file.stream for file in files):
-        _remove(directory / stream, [file for file in files if file.stream == stream])
+    with _alone(directory):
+        for stream in dict.fromkeys(file.stream for file in files):
+            _remove(directory / stream, [file for file in files if file.stream == stream])
+
+
+@contextmanager
+def _alone(directory: Path) -> Iterator[None]:
+    """Nobody else takes files of this log away: two at once would each record only what they took themselves."""
+    with (directory / LOCK_NAME).open("ab") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise InputError(f"{directory}: another process takes files away: one at a time") from error
+        yield
 
 
 def _remove(folder: Path, files: Sequence[LogFile]) -> None:

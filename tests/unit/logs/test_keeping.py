@@ -1,5 +1,6 @@
 """Sealing, retaining and what verification says of both."""
 
+import fcntl
 import subprocess
 from collections.abc import Iterator, Sequence
 from contextlib import closing
@@ -10,7 +11,7 @@ import pytest
 
 from event_examples.one_each import ONE_OF_EACH
 from event_examples.rows import START_NS, STEP_NS, imu_row, imu_rows
-from trigpoint.errors import LogDamaged
+from trigpoint.errors import InputError, LogDamaged
 from trigpoint.events.envelope import Envelope, EventIdentity, LogPosition
 from trigpoint.events.mapped import MapSolved
 from trigpoint.logs.absences import Absence, BootRanges, Reason, record_absences, recorded_absences, uncovered
@@ -18,6 +19,7 @@ from trigpoint.logs.following import StreamFollower
 from trigpoint.logs.mcap_log import McapLog
 from trigpoint.logs.retention import (
     FRAME_STREAM,
+    LOCK_NAME,
     MAP_STREAM,
     Keeping,
     LogFile,
@@ -309,3 +311,13 @@ def test_what_no_absence_accounts_for_is_left() -> None:
     ]
     assert uncovered([(0, 10)], gone) == ((0, 2), (4, 6), (8, 10))
     assert uncovered([(2, 4), (7, 7)], gone) == ()
+
+
+def test_while_another_process_takes_files_away_nothing_goes_and_afterwards_it_does(log: McapLog, folder: Path) -> None:
+    with (log.directory / LOCK_NAME).open("ab") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        with pytest.raises(InputError, match="one at a time"):
+            _retained(log, 250)
+        assert recorded_absences(folder) == ()
+    _retained(log, 250)
+    assert [absence.first_number for absence in recorded_absences(folder)] == [0, 100]
