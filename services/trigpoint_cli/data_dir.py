@@ -11,7 +11,8 @@ import click
 from trigpoint.errors import InputError
 from trigpoint.landmarks.opening import geopackage_path, opened_store
 from trigpoint.landmarks.ports import LandmarkStore
-from trigpoint.logs.mcap_log import McapLog
+from trigpoint.logs.mcap_log import DEFAULT_ROTATION, McapLog
+from trigpoint.logs.stream_writer import Rotation
 from trigpoint_cli.database import DATABASE_NAME, EMBEDDED, AskedDatabase, asked_database, database_settings
 
 LOG_NAME = "log"
@@ -75,10 +76,10 @@ class DataDirectory:
             yield log
 
     @contextmanager
-    def new_log(self) -> Iterator[McapLog]:
+    def new_log(self, rotation: Rotation = DEFAULT_ROTATION) -> Iterator[McapLog]:
         """The log, made where it is not there yet. Raises InputError if it cannot be."""
         try:
-            log = McapLog(self.log)
+            log = McapLog(self.log, rotation=rotation)
         except OSError as error:
             raise InputError(f"{self.log}: no log can be opened here: {error}") from error
         try:

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from trigpoint.configuration.sections import LogSettings
 from trigpoint.errors import InputError
 from trigpoint.landmarks.geopackage_store import GeoPackageStore
 from trigpoint.logs.mcap_log import McapLog
@@ -24,6 +25,7 @@ from trigpoint.logs.retention import (
 from trigpoint.logs.seals import seal_finished
 from trigpoint_cli.data_dir import LOG_NAME, DataDirectory
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering
+from trigpoint_cli.settings import configuration_options, log_settings
 
 NS_PER_DAY = 86_400_000_000_000
 CHECKPOINT_LIMIT_BYTES = 16 * 1024 * 1024
@@ -66,6 +68,7 @@ def seal_command(path: Path, *, screen: Screen) -> Answer:
 @directory_argument
 @click.option("--keep-days", type=click.FloatRange(min=0.0), help="Keep what was measured in so many last days.")
 @click.option("--keep-bytes", type=click.IntRange(min=0), help="Keep the newest files of so many bytes together.")
+@configuration_options
 @click.option(
     "--checkpoints",
     "checkpoint_files",
@@ -81,16 +84,16 @@ def seal_command(path: Path, *, screen: Screen) -> Answer:
 def retain_command(path: Path, *, screen: Screen, **options: Any) -> Answer:
     """Take the oldest sealed files out of the log in DIR, where every reader has passed them, and record that.
 
-    The landmark database beside the log is a reader of itself. The newest map version, the map's frame and
-    corrections always stay.
+    Without --keep-days and --keep-bytes, [log] keep_days or keep_bytes of the configuration says how much stays. The
+    landmark database beside the log is a reader of itself. The newest map version, the map's frame and corrections
+    always stay.
     """
-    if (options["keep_days"] is None) == (options["keep_bytes"] is None):
-        raise click.UsageError("say either --keep-days or --keep-bytes")
+    keeping = _keeping(options["keep_days"], options["keep_bytes"], log_settings(options["config"], options["flags"]))
     directory = log_directory(path)
     passed = _checkpoints(options["checkpoint_files"], options["passed"]) | _database_checkpoint(path)
     with closing(McapLog(directory)) as log:
         held = obstacles(log, passed, also_inputs=options["also_inputs"])
-        plan = planned_retention(log_files(log), held, _keeping(options["keep_days"], options["keep_bytes"]))
+        plan = planned_retention(log_files(log), held, keeping)
         if not options["dry_run"]:
             remove_files(directory, plan.removed)
     values = {
@@ -106,7 +109,12 @@ def retain_command(path: Path, *, screen: Screen, **options: Any) -> Answer:
     return Answer(values, (f"{len(plan.removed)} files {would}taken away", *lines, *kept))
 
 
-def _keeping(keep_days: float | None, keep_bytes: int | None) -> Keeping:
+def _keeping(keep_days: float | None, keep_bytes: int | None, configured: LogSettings) -> Keeping:
+    """What was asked for, or else is configured. Raises click.UsageError where that is neither, or both."""
+    if keep_days is None and keep_bytes is None:
+        keep_days, keep_bytes = configured.keep_days, configured.keep_bytes
+    if (keep_days is None) == (keep_bytes is None):
+        raise click.UsageError("say either --keep-days or --keep-bytes, or configure one of them under [log]")
     if keep_days is None:
         return Keeping(total_bytes=keep_bytes)
     return Keeping(newer_than_ns=time.time_ns() - round(keep_days * NS_PER_DAY))

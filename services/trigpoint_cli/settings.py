@@ -12,13 +12,14 @@ import click
 from trigpoint.bus.router import RouterSettings
 from trigpoint.bus.zenoh_bus import ZenohSettings
 from trigpoint.configuration.building import Configured, configured
-from trigpoint.configuration.given import from_environment, from_flags, from_toml
+from trigpoint.configuration.given import Layer, from_environment, from_flags, from_toml
 from trigpoint.configuration.limits import SetElsewhere
 from trigpoint.configuration.sections import (
     DatabaseSettings,
     FleetSettings,
     HttpSettings,
     LoggingSettings,
+    LogSettings,
     ServeSettings,
     TracingSettings,
     UpSettings,
@@ -44,6 +45,7 @@ class Settings:
 
     fleet: FleetSettings
     bus: ZenohSettings = field(default_factory=lambda: CLIENT_OF_ROUTER)
+    log: LogSettings = field(default_factory=LogSettings)
     database: DatabaseSettings = field(default_factory=DatabaseSettings)
     ingest: Annotated[IngestSettings, NAMES_OF_FLEET] = field(default_factory=IngestSettings)
     filtering: FilterSettings = field(default_factory=FilterSettings)
@@ -58,10 +60,27 @@ class Settings:
     tracing: TracingSettings = field(default_factory=TracingSettings)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _LogOnly:
+    """A configuration of which only the log counts."""
+
+    log: LogSettings = field(default_factory=LogSettings)
+
+
 def configured_settings(file: Path | None, flags: Sequence[str]) -> Configured[Settings]:
     """The settings from flags, over the environment, over a file. Raises ConfigurationRefused, InputError."""
+    return configured(Settings, _layers(file, flags))
+
+
+def log_settings(file: Path | None, flags: Sequence[str]) -> LogSettings:
+    """The log's section alone, for commands that need nothing else set; raises as `configured_settings` does."""
+    layers = [{path: given for path, given in layer.items() if path[0] == "log"} for layer in _layers(file, flags)]
+    return configured(_LogOnly, layers).settings.log
+
+
+def _layers(file: Path | None, flags: Sequence[str]) -> list[Layer]:
     layers = [from_environment(os.environ), from_flags(flags)]
-    return configured(Settings, layers if file is None else [from_toml(file), *layers])
+    return layers if file is None else [from_toml(file), *layers]
 
 
 def password_of(database: DatabaseSettings) -> str | None:

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from trigpoint.observability.metrics import Instruments
 from trigpoint.observability.running import Service
 from trigpoint_cli.serving.resources import data_of, opened_resources
+from trigpoint_cli.serving.sealing import sealing
 from trigpoint_cli.settings import Settings
 from trigpoint_filtering.live import LiveFiltering
 
@@ -13,7 +14,7 @@ from trigpoint_filtering.live import LiveFiltering
 @contextmanager
 def opened(settings: Settings, instruments: Instruments) -> Iterator[Service]:
     """Filtering on the fleet's log and bus."""
-    with opened_resources(settings) as resources:
+    with opened_resources(settings) as resources, sealing(resources.log):
         yield LiveFiltering(
             resources.log,
             resources.bus,

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from trigpoint.observability.metrics import Instruments
 from trigpoint.observability.running import Service
 from trigpoint_cli.serving.resources import opened_resources
+from trigpoint_cli.serving.sealing import sealing
 from trigpoint_cli.settings import Settings
 from trigpoint_optimisation.live import LiveOptimisation
 from trigpoint_optimisation.whole_solve import SolverProcess
@@ -14,7 +15,7 @@ from trigpoint_optimisation.whole_solve import SolverProcess
 @contextmanager
 def opened(settings: Settings, instruments: Instruments) -> Iterator[Service]:
     """Optimisation on the fleet's log and bus, whole solves in processes of their own."""
-    with opened_resources(settings) as resources:
+    with opened_resources(settings) as resources, sealing(resources.log):
         yield LiveOptimisation(
             resources.log,
             SolverProcess(resources.log.directory, settings.optimisation),

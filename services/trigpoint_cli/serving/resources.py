@@ -6,10 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from trigpoint.bus.zenoh_bus import ZenohBus
+from trigpoint.configuration.sections import LogSettings
 from trigpoint.landmarks.opening import geopackage_path, geopackage_url
 from trigpoint.logs.mcap_log import McapLog
+from trigpoint.logs.stream_writer import Rotation
 from trigpoint_cli.data_dir import DataDirectory
 from trigpoint_cli.settings import Settings
+
+NS_PER_S = 1e9
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +35,14 @@ def database_url(settings: Settings) -> str:
     return geopackage_url(data_of(settings).database) if geopackage_path(url) == Path() else url
 
 
+def rotation_of(settings: LogSettings) -> Rotation:
+    """When a file of the log is long enough, as it is configured."""
+    span_ns, age_ns = round(settings.file_span_s * NS_PER_S), round(settings.file_age_s * NS_PER_S)
+    return Rotation(size_bytes=settings.file_bytes, span_ns=span_ns, age_ns=age_ns)
+
+
 @contextmanager
 def opened_resources(settings: Settings) -> Iterator[Resources]:
     """The log and the bus; closed in reverse, the log last. Raises InputError, ServiceError."""
-    with data_of(settings).new_log() as log, ZenohBus(settings.bus) as bus:
+    with data_of(settings).new_log(rotation_of(settings.log)) as log, ZenohBus(settings.bus) as bus:
         yield Resources(log, bus)

@@ -7,7 +7,7 @@ from urllib.parse import urlsplit
 
 from pydantic import Field
 
-from trigpoint.configuration.limits import Count, Name, Port, Seconds, Share
+from trigpoint.configuration.limits import Count, Name, Port, Positive, Seconds, Share
 from trigpoint.errors import InputError
 from trigpoint.events.keys import DEFAULT_MAP, DEFAULT_ROOT, valid_name
 
@@ -28,6 +28,30 @@ class FleetSettings:
     def __post_init__(self) -> None:
         valid_name(self.root)
         valid_name(self.map)
+
+
+FILE_BYTES_LEAST = 65_536  # every file has a beginning and an end of its own
+MIB = 1024 * 1024
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LogSettings:
+    """When a file of the log ends, and what `trigpoint log retain` keeps unless it is told otherwise.
+
+    A file ends at `file_bytes`, or at `file_span_s` of measurements if it is not small then, or after it was open for
+    `file_age_s`. Kept is what was measured in the last `keep_days`, or the newest `keep_bytes`; without either nothing
+    is said about it.
+    """
+
+    file_bytes: Annotated[int, Field(ge=FILE_BYTES_LEAST)] = 64 * MIB
+    file_span_s: Positive = 3_600.0
+    file_age_s: Positive = 86_400.0
+    keep_days: Positive | None = None
+    keep_bytes: Count | None = None
+
+    def __post_init__(self) -> None:
+        if self.keep_days is not None and self.keep_bytes is not None:
+            raise InputError(f"keep_days {self.keep_days:g} and keep_bytes {self.keep_bytes}: only one may be set")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

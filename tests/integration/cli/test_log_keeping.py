@@ -9,8 +9,10 @@ import pytest
 
 from command_runs.running import trigpoint
 from event_examples.rows import STEP_NS, imu_rows
+from trigpoint.configuration.sections import LogSettings
 from trigpoint.logs.mcap_log import McapLog
 from trigpoint.logs.stream_writer import Rotation
+from trigpoint_cli.serving.resources import rotation_of
 from trigpoint_cli.serving.sealing import seal_written
 
 STREAM = "veh-van"
@@ -131,6 +133,32 @@ def test_recovery_into_a_directory_that_holds_something_is_refused(data: Path) -
     said = trigpoint("log", "recover", data, data, "--json")
     assert said.status == 2
     assert "holds something already" in said.answer["error"]
+
+
+def test_what_is_kept_may_be_configured_and_a_flag_goes_before_that(
+    data: Path, checkpoints: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = tmp_path / "trigpoint.toml"
+    config.write_text("[log]\nkeep_bytes = 1\n", encoding="utf-8")
+    trigpoint("log", "seal", data)
+    words = ("log", "retain", data, "--config", config, "--checkpoints", checkpoints, "--dry-run", "--json")
+    assert len(trigpoint(*words).answer["removed"]) == 2
+    assert trigpoint(*words, "--keep-bytes", 10_000_000).answer["removed"] == []
+    monkeypatch.setenv("TRIGPOINT_LOG__KEEP_BYTES", "10000000")
+    assert trigpoint(*words).answer["removed"] == []
+
+
+def test_a_configuration_that_keeps_by_age_and_by_size_is_refused(data: Path) -> None:
+    said = trigpoint("log", "retain", data, "--set", "log.keep_days=1", "--set", "log.keep_bytes=2", "--json")
+    assert said.status == 2
+    assert "keep_days 1 and keep_bytes 2" in said.answer["error"]
+
+
+def test_a_service_s_files_end_as_they_are_configured() -> None:
+    configured = LogSettings(file_bytes=65_536, file_span_s=60.0, file_age_s=120.0)
+    rotation = rotation_of(configured)
+    assert (rotation.size_bytes, rotation.span_ns, rotation.age_ns) == (65_536, 60 * 10**9, 120 * 10**9)
+    assert rotation_of(LogSettings()) == Rotation()
 
 
 def _answers(data: Path) -> Mapping[str, object]:
