@@ -94,10 +94,10 @@ class IngestService:
     def _advance(self) -> None:
         """The group under way looked after; without one, the next begun when it is due."""
         now_s = self._now_s()
+        if self._committing is not None and self._committing.done():
+            self._finish()
         if self._committing is not None:
-            if self._committing.done():
-                self._finish()
-            elif now_s - self._begun_s > self._settings.slow_append_s:
+            if now_s - self._begun_s > self._settings.slow_append_s:
                 self._tell_blocked(f"a group takes longer than {self._settings.slow_append_s:g} s")
         elif self._group is not None:
             if now_s - self._begun_s >= self._settings.disk_retry_s:

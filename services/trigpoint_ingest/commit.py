@@ -23,7 +23,7 @@ from trigpoint_ingest.settings import IngestSettings
 DISK_ERRORS = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS))  # room and media: an operator mends them
 SQLITE_DISK_ERRORS = frozenset((8, 10, 13))  # SQLITE_READONLY, SQLITE_IOERR, SQLITE_FULL (sqlite.org/rescode.html)
 SQLITE_PRIMARY = 0xFF  # bits of the primary code in an extended one
-APPEND_THREADS = 4  # streams that wait for the disk at the same time
+APPEND_THREADS = 16  # streams that wait for the disk at the same time
 
 Row = Envelope[Event] | EncodedRun
 
