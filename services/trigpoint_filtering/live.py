@@ -20,6 +20,7 @@ from trigpoint.geodesy.projection import MapFrame
 from trigpoint.logs.following import StreamFollower
 from trigpoint.logs.ports import RecallingLog
 from trigpoint.logs.readings import VEHICLE_PREFIX, pinned_frame, vehicle_streams
+from trigpoint.observability.backlog import Backlog
 from trigpoint.observability.metrics import Instruments
 from trigpoint_filtering.app import KINDS, STREAM
 from trigpoint_filtering.checkpoint import Progress, read_progress, write_progress
@@ -62,7 +63,7 @@ class LiveFiltering:
         self._said = _said_before(log)
         self._streams = StreamFollower(log, _is_vehicle, kinds=KINDS)
         self._fleet: FleetFollower | None = None
-        self._had_all_s = time.monotonic()
+        self._backlog = Backlog(self._instruments)
         self._closed = False
         self.ready = False
         self._subscription = bus.subscribe(f"{root}/{KEY_VERSION}/veh/*/obs/**")
@@ -93,7 +94,7 @@ class LiveFiltering:
         logged = self._streams.take(BATCH)
         rows = [told for row in logged for told in fleet.take(cast(Envelope[Observed], row.envelope))]
         self._append(rows)
-        self._show_lag()
+        self._backlog.show(taken=sum(self._streams.checkpoint.values()), lag_events=self._streams.lag)
         if logged and time.monotonic() >= self._kept_s + CHECKPOINT_S:
             self._keep(fleet)
         return bool(logged)
@@ -147,13 +148,6 @@ class LiveFiltering:
             self._instruments.accepted.labels(event.vehicle).inc()
         elif isinstance(event, FixJudged):
             self._instruments.rejected.labels(event.vehicle, event.reason).inc()
-
-    def _show_lag(self) -> None:
-        lag_events = self._streams.lag
-        if not lag_events:
-            self._had_all_s = time.monotonic()
-        self._instruments.projection_lag_events.set(lag_events)
-        self._instruments.projection_lag_seconds.set(time.monotonic() - self._had_all_s if lag_events else 0.0)
 
     def close(self) -> None:
         """What the log has is taken, for at most `CLOSE_S`, and if that was all, what still waited for later events

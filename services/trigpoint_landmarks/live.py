@@ -12,6 +12,7 @@ from trigpoint.events.keys import DEFAULT_ROOT, KEY_PATTERNS, KEY_VERSION
 from trigpoint.events.mapped import MapSolved
 from trigpoint.landmarks.ports import LandmarkStore
 from trigpoint.logs.ports import EventLog
+from trigpoint.observability.backlog import Backlog
 from trigpoint.observability.metrics import Instruments
 from trigpoint_landmarks.projecting import MAP_STREAM, Projector
 from trigpoint_landmarks.settings import LandmarkSettings
@@ -45,7 +46,7 @@ class LandmarkProjection:
             self._subscription = bus.subscribe(f"{root}/{KEY_VERSION}/{pattern}")
         self._ready = False
         self._next_number = 0
-        self._had_all_s = time.monotonic()
+        self._backlog = Backlog(self._instruments)
 
     @property
     def ready(self) -> bool:
@@ -108,10 +109,7 @@ class LandmarkProjection:
 
     def _show_lag(self) -> None:
         lag_events = max(0, self._log.next_number(MAP_STREAM) - self._next_number)
-        if not lag_events:
-            self._had_all_s = time.monotonic()
-        self._instruments.projection_lag_events.set(lag_events)
-        self._instruments.projection_lag_seconds.set(time.monotonic() - self._had_all_s if lag_events else 0.0)
+        self._backlog.show(taken=self._next_number, lag_events=lag_events)
 
     def _refuse(self, map_version: int, reason: str) -> None:
         self._instruments.rejected.labels(vehicle="", reason="map version").inc()

@@ -27,6 +27,7 @@ from trigpoint.geodesy.projection import MapFrame
 from trigpoint.logs.following import StreamFollower
 from trigpoint.logs.ports import EventLog
 from trigpoint.logs.readings import LABEL_STREAM, VEHICLE_PREFIX, VERDICT_STREAM, logged_corrections, pinned_frame
+from trigpoint.observability.backlog import Backlog
 from trigpoint.observability.metrics import Instruments
 from trigpoint_optimisation.app import SOURCE, STREAM, boot_id_of, envelopes, input_positions
 from trigpoint_optimisation.core.live_fleet import LiveFleet
@@ -65,6 +66,7 @@ class LiveOptimisation:
         self._root, self._map_name = names
         self._settings = settings or SolveSettings()
         self._instruments = instruments or Instruments("optimisation")
+        self._backlog = Backlog(self._instruments)
         self._subscription: Subscription | None = None
         if bus is not None:
             self._subscription = bus.subscribe(f"{self._root}/{KEY_VERSION}/veh/*/obs/**")
@@ -161,7 +163,8 @@ class LiveOptimisation:
             self._correction_s = time.monotonic()
         if rows or verdicts:
             self._news_s = time.monotonic()
-        self._instruments.projection_lag_events.set(self._measured.lag if len(rows) == BATCH else 0)
+        lag_events = self._measured.lag if rows else 0  # who found nothing new is not behind
+        self._backlog.show(taken=sum(self._measured.checkpoint.values()), lag_events=lag_events)
         return bool(rows or verdicts)
 
     def _correct(self, places: Sequence[DrivePlace]) -> None:
@@ -224,7 +227,8 @@ class LiveOptimisation:
         """Events appended, then published."""
         if not rows:
             return
-        self._log.append(stream, rows)
+        with self._instruments.fsync_seconds.time():
+            self._log.append(stream, rows)
         if self._bus is not None:
             root, name, frame = self._root, self._map_name, self._frame
             self._bus.publish_all(

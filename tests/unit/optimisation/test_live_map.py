@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator
+from contextlib import closing
 from functools import cache
 
 import numpy as np
@@ -23,7 +24,8 @@ from trigpoint.events.observed import (
 from trigpoint.events.solved import SolvedMap
 from trigpoint.logs.memory_log import MemoryLog
 from trigpoint.logs.readings import logged_maps
-from trigpoint_optimisation.live import LiveOptimisation
+from trigpoint.observability.metrics import Instruments
+from trigpoint_optimisation.live import BATCH, LiveOptimisation
 from trigpoint_optimisation.settings import LiveSettings, SolveSettings
 from trigpoint_optimisation.whole_solve import SolverInPlace
 
@@ -138,6 +140,17 @@ def off_poles_sigmas(landmarks: Iterable[LandmarkSolved]) -> list[float]:
         nearest = off[np.hypot(*off.T).argmin()]
         sigmas.append(float(np.sqrt(nearest @ np.linalg.solve(one.covariance_m2, nearest))))
     return sigmas
+
+
+def test_what_is_not_taken_in_yet_and_what_becoming_durable_takes_is_measured() -> None:
+    log, rows, instruments = pinned(), car_rows(), Instruments("optimisation")
+    log.append("filtering", accepted(rows))
+    log.append("veh-car", rows)
+    with closing(LiveOptimisation(log, SolverInPlace(log, EAGER), settings=EAGER, instruments=instruments)) as service:
+        assert all([service.step(), service.step()])
+    shown = instruments.registry.get_sample_value
+    assert shown("trigpoint_projection_lag_events") == len(rows) - 2 * BATCH
+    assert (shown("trigpoint_projection_lag_seconds"), shown("trigpoint_fsync_seconds_count")) > (0.0, 0.0)
 
 
 def test_a_drive_with_fixes_becomes_a_map_within_what_fixes_hold() -> None:
