@@ -4,17 +4,16 @@ import gc
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from typing import cast
+from dataclasses import dataclass
 
-from trigpoint.errors import FrameRefused
+from trigpoint.errors import EventRejected, FrameRefused
 from trigpoint.events.corrected import AnchorLabelled, Corrected
-from trigpoint.events.envelope import Envelope, LogPosition
+from trigpoint.events.envelope import LogPosition
 from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.mapped import (
     AnchorAssociated,
     ImageOffsetSolved,
     LandmarkSolved,
-    Mapped,
     MapSolved,
     TrajectorySolved,
 )
@@ -22,8 +21,8 @@ from trigpoint.geodesy.projection import MapFrame
 from trigpoint.landmarks.model import Landmark, MapChange
 from trigpoint.landmarks.ports import LandmarkStore
 from trigpoint.landmarks.queries import LandmarkQuery
-from trigpoint.logs.following import StreamFollower
-from trigpoint.logs.ports import EventLog, LoggedEvent
+from trigpoint.logs.following import RunFollower
+from trigpoint.logs.ports import EventLog
 from trigpoint.logs.readings import logged_frame
 from trigpoint_landmarks.core.rows import labels_within, make_valid, map_change
 from trigpoint_landmarks.core.versions import OpenVersion, SolvedVersion, refusal_of
@@ -31,10 +30,20 @@ from trigpoint_landmarks.core.versions import OpenVersion, SolvedVersion, refusa
 MAP_STREAM = STREAM_PATTERNS[MapSolved]
 LABEL_STREAM = STREAM_PATTERNS[AnchorLabelled]
 KINDS = (AnchorAssociated, ImageOffsetSolved, LandmarkSolved, MapSolved, TrajectorySolved)
+BATCH_BYTES = 32 * 1024 * 1024  # of payloads, which take some times that while they become rows
 
 Inputs = tuple[tuple[str, int], ...]
 Labels = Mapping[tuple[str, str], AnchorLabelled]
 Refused = Callable[[int, str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class _Batch:
+    """So many events up to before `next_number`, and the versions they close."""
+
+    count: int
+    next_number: int
+    versions: tuple[SolvedVersion, ...]
 
 
 class Projector:
@@ -49,10 +58,11 @@ class Projector:
         self._valid: dict[str, Landmark] = {row.landmark: row for row in store.landmarks(LandmarkQuery())}
         self._newest = max((version.map_version for version in store.map_versions()), default=0)
         self.next_number = self._checkpoint.next_number(MAP_STREAM)  # of the first event not taken
-        self._follower = StreamFollower(log, (MAP_STREAM,), checkpoint={MAP_STREAM: self.next_number}, kinds=KINDS)
+        self._follower = RunFollower(log, MAP_STREAM, first_number=self.next_number, kinds=KINDS)
         self._reader = ThreadPoolExecutor(max_workers=1, thread_name_prefix="reading-ahead")
-        self._ahead: Future[list[LoggedEvent]] | None = None
+        self._ahead: Future[_Batch] | None = None
         self._open = OpenVersion()
+        self._error: EventRejected | None = None
         self._frame: MapFrame | None = None
         self._labels: tuple[Inputs, Labels] = ((), {})
 
@@ -72,37 +82,51 @@ class Projector:
         return self._log.next_number(MAP_STREAM) - self.next_number
 
     def take(self, limit: int) -> tuple[int, tuple[int, ...]]:
-        """How many of the next events were taken, at most `limit`, and the versions that are in the store by them.
+        """How many of the next events were taken, at most `limit` (fewer of large ones), and the versions that are in
+        the store by them.
 
         Raises InputError if versions are there and no frame is pinned, LogDamaged, and ServiceError from the store;
         after any of these the store is as it was, and this projector of no more use.
         """
         with _uncollected():
-            rows = self._rows(limit)
+            batch = self._next_batch(limit)
             changes: list[MapChange] = []
             checkpoint = self._checkpoint
-            for row in rows:
-                version = self._open.after(row.position, cast(Envelope[Mapped], row.envelope))
-                change = None if version is None else self._change_of(version)
-                if version is not None and change is not None:
+            for version in batch.versions:
+                change = self._change_of(version)
+                if change is not None:
                     changes.append(change)
                     checkpoint = checkpoint.after(version.position)
             if changes:
                 self._store.apply_all(changes, checkpoint)
                 self._checkpoint = checkpoint
-        if rows:
-            self.next_number = rows[-1].position.number + 1
-        return len(rows), tuple(change.version.map_version for change in changes)
+        self.next_number = max(self.next_number, batch.next_number)
+        return batch.count, tuple(change.version.map_version for change in changes)
 
     def close(self) -> None:
         """Nothing is read any more."""
         self._reader.shutdown(cancel_futures=True)
 
-    def _rows(self, limit: int) -> list[LoggedEvent]:
+    def _next_batch(self, limit: int) -> "_Batch":
         """The next events; while the database takes them in, those after them are read."""
-        rows = self._follower.take(limit) if self._ahead is None else self._ahead.result()
-        self._ahead = self._reader.submit(self._follower.take, limit) if len(rows) == limit else None
-        return rows
+        batch = self._read(limit) if self._ahead is None else self._ahead.result()
+        self._ahead = self._reader.submit(self._read, limit) if self._follower.is_behind else None
+        return batch
+
+    def _read(self, limit: int) -> "_Batch":
+        """The next events; an error is kept, so that none of the versions before it is lost by it."""
+        if self._error is not None:
+            error, self._error = self._error, None
+            raise error
+        runs = self._follower.take(limit, limit_bytes=BATCH_BYTES)
+        versions: list[SolvedVersion] = []
+        try:
+            for run in runs:
+                versions.extend(self._open.after(run))
+        except EventRejected as error:
+            self._error = error
+        count = sum(len(run.run) for run in runs)
+        return _Batch(count, runs[-1].next_number if runs else 0, tuple(versions))
 
     def _change_of(self, version: SolvedVersion) -> MapChange | None:
         """What the version changes, which is known from now on; None for one that is refused."""

@@ -11,13 +11,14 @@ DATABASE_NAME = "landmarks.gpkg"
 class LandmarkSettings:
     """How the projection follows the log.
 
-    Map versions are taken in `batch_events` events at a time, those that end among them in one transaction. With
-    more than `bulk_events` to take in, spatial indexes are put off until that is done. Without word from the bus the
-    log is looked at every `look_s`; a database that is away is tried again after `retry_s`, then twice as long each
-    time, up to `retry_limit_s`.
+    Map versions are taken in `batch_events` events at a time (fewer where they are large), those that end among them in
+    one transaction: the more, the fewer rows are written only to be moved into the history. With more than
+    `bulk_events` to take in, spatial indexes are put off until that is done. Without word from the bus the log is
+    looked at every `look_s`; a database that is away is tried again after `retry_s`, then twice as long each time, up
+    to `retry_limit_s`.
     """
 
-    batch_events: Count = 20_000
+    batch_events: Count = 100_000
     bulk_events: Count = 100_000
     look_s: Seconds = 0.5
     retry_s: Seconds = 0.2

@@ -14,9 +14,10 @@ from landmark_databases.served import projecting, taken_in, wait_until
 from landmark_maps.examples import MAP_STREAM
 from landmark_maps.histories import History, append_history
 from trigpoint.logs.mcap_log import McapLog
+from trigpoint_landmarks.settings import LandmarkSettings
 
 HISTORY = History(landmark_count=20_000, changed_count=2_000, event_count=1_000_000)
-BATCH_EVENTS = 20_000  # the service's own default
+BATCH_EVENTS = LandmarkSettings().batch_events
 LIMIT_S = 900.0
 COMMAND = (
     f"trigpoint serve landmarks  # {HISTORY.event_count} events: a map of {HISTORY.landmark_count} landmarks, "

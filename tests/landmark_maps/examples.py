@@ -1,7 +1,6 @@
 """Small maps by hand: the frame is UTM 56S (Sydney) with its origin at 332 000 E, 6 248 000 N."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from trigpoint.events.mapped import (
     TrajectorySolved,
 )
 from trigpoint.events.observed import MapFramePinned
+from trigpoint.events.runs import LoggedRun, encoded
 from trigpoint.geodesy.positions import GridPosition, MapPosition
 from trigpoint.geodesy.projection import MapFrame, pin_map_frame, wgs84_from_map
 from trigpoint.landmarks.model import Checkpoint, Landmark, MapChange, MapVersion
@@ -95,7 +95,7 @@ def change(
     """A map version that opens and closes landmarks, and nothing else."""
     return MapChange(
         version=version_row(map_version, landmark_count=len(opened), crs=crs),
-        opened=tuple(replace(row, valid_from_version=map_version) for row in opened),
+        opened=tuple(row._replace(valid_from_version=map_version) for row in opened),
         closed=tuple(closed),
         trajectories=(),
         anchors=(),
@@ -194,6 +194,17 @@ def solved_map(map_version: int, landmarks: Sequence[LandmarkSolved], *, labels:
     ]
 
 
+def logged(events: Sequence[Mapped], *, boot_id: str = "boot-1", first: int = 0) -> list[LoggedRun]:
+    """Events of the optimiser as they stand in its stream from number `first` on."""
+    return [
+        LoggedRun(
+            LogPosition(MAP_STREAM, number),
+            encoded(Envelope(EventIdentity("trigpoint_optimisation", boot_id, number), START_NS, event)),
+        )
+        for number, event in enumerate(events, start=first)
+    ]
+
+
 def append_mapped(log: EventLog, events: Sequence[Mapped], *, boot_id: str = "boot-1") -> None:
     """Events of the optimiser at the end of its stream."""
     first = log.next_number(MAP_STREAM)
@@ -226,9 +237,5 @@ def pin_frame(log: EventLog) -> None:
 def whole_change(map_version: int = 1) -> MapChange:
     """A map version with something in every table, as the service makes it from events."""
     events = solved_map(map_version, [solved_landmark("L1", 1.5, 2.5, map_version=map_version)], labels=1)
-    rows = [
-        (LogPosition(MAP_STREAM, number), Envelope(EventIdentity("optimisation", "boot-1", number), START_NS, event))
-        for number, event in enumerate(events)
-    ]
-    (version,) = solved_versions(rows)
+    (version,) = solved_versions(logged(events))
     return map_change(version, frame=frame(), labels={("anchor-1", "tile-1"): label("anchor-1")}, valid={})

@@ -43,8 +43,12 @@ def _difference(key: RowKey, held: Mapping[RowKey, MapRow], replayed: Mapping[Ro
         return RowDifference(*key, "not in the log")
     if ours == theirs:
         return None
-    named = [field.name for field in fields(ours) if getattr(ours, field.name) != getattr(theirs, field.name)]
+    named = [name for name in _columns(ours) if getattr(ours, name) != getattr(theirs, name)]
     return RowDifference(*key, "; ".join(_said(name, getattr(ours, name), getattr(theirs, name)) for name in named))
+
+
+def _columns(row: MapRow) -> tuple[str, ...]:
+    return row._fields if isinstance(row, Landmark) else tuple(field.name for field in fields(row))
 
 
 def _said(name: str, ours: object, theirs: object) -> str:

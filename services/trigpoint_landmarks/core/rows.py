@@ -2,15 +2,16 @@
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import repeat
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trigpoint.events.corrected import AnchorLabelled, Corrected, anchors_in_force
 from trigpoint.events.envelope import LogPosition
-from trigpoint.events.mapped import AnchorAssociated, ImageOffsetSolved, LandmarkSolved, TrajectorySolved
+from trigpoint.events.mapped import AnchorAssociated, ImageOffsetSolved, TrajectorySolved
+from trigpoint.events.solved_landmarks import Observations, SolvedLandmarks
 from trigpoint.geodesy.positions import Wgs84Position
 from trigpoint.geodesy.projection import MapFrame, map_from_wgs84, wgs84_from_map_points
 from trigpoint.geodesy.uncertainty import ellipses_of
@@ -49,8 +50,7 @@ def map_change(version: SolvedVersion, *, frame: MapFrame, labels: Labels, valid
     version that is a change of the one before, landmarks it does not name keep theirs too.
     """
     removed = frozenset(version.solved.removed) if version.solved.base_version else frozenset()
-    named = [row for row in version.landmarks if row.landmark not in removed]
-    solved = {row.landmark: row for row in landmark_rows(named, frame)}
+    solved = {row.landmark: row for row in landmark_rows(_without(version.landmarks, removed), frame)}
     kept = {name for name, row in solved.items() if name in valid and _is_same(valid[name], row)}
     gone: Iterable[str] = (*solved, *removed) if version.solved.base_version else valid
     return MapChange(
@@ -71,52 +71,51 @@ def make_valid(valid: dict[str, Landmark], change: MapChange) -> None:
         valid[row.landmark] = row
 
 
-def landmark_rows(landmarks: Sequence[LandmarkSolved], frame: MapFrame) -> list[Landmark]:
+def landmark_rows(solved: SolvedLandmarks, frame: MapFrame) -> list[Landmark]:
     """The landmarks as rows valid from their version on."""
-    if not landmarks:
+    if not len(solved):
         return []
-    points_m = np.array([row.position_m for row in landmarks], dtype=np.float64).reshape(-1, 2)
-    covariances_m2 = np.array([row.covariance_m2 for row in landmarks], dtype=np.float64).reshape(-1, 2, 2)
-    lat_deg, lon_deg = wgs84_from_map_points(points_m, frame)
+    points_m, covariances_m2 = solved.positions_m, solved.covariances_m2
+    grid_m = points_m + np.array([frame.origin_easting_m, frame.origin_northing_m])
+    placed = [points_m, grid_m, *wgs84_from_map_points(points_m, frame)]
     variances_m2 = covariances_m2.reshape(-1, 4)[:, [0, 1, 3]]
-    placed = np.column_stack([points_m, lat_deg, lon_deg, ellipses_of(covariances_m2), variances_m2]).tolist()
-    return [_landmark_row(row, place, frame) for row, place in zip(landmarks, placed, strict=True)]
+    columns = np.column_stack([*placed, variances_m2, ellipses_of(covariances_m2)]).T.tolist()
+    rows = zip(
+        solved.landmarks,
+        solved.kinds,
+        solved.signatures,
+        *columns,
+        solved.observation_counts.tolist(),
+        solved.vehicles,
+        solved.first_seen_ns.tolist(),
+        solved.last_seen_ns.tolist(),
+        map(bool, solved.anchors),
+        solved.anchors,
+        _provenances(solved.observations),
+        solved.map_versions.tolist(),
+        repeat(None),
+        strict=False,
+    )
+    return list(map(Landmark._make, rows))
+
+
+def _without(solved: SolvedLandmarks, removed: frozenset[str]) -> SolvedLandmarks:
+    if removed.isdisjoint(solved.landmarks):
+        return solved
+    return solved.picked(np.flatnonzero([name not in removed for name in solved.landmarks]))
+
+
+def _provenances(observations: Sequence[Observations]) -> Iterator[str]:
+    """The text of each landmark's observations; made once of those that are one and the same."""
+    distinct = {id(one): one for one in observations}
+    texts = {number: provenance_json(one) for number, one in distinct.items()}
+    return (texts[id(one)] for one in observations)
 
 
 def _is_same(held: Landmark, solved: Landmark) -> bool:
     if held.x_m != solved.x_m or held.y_m != solved.y_m:
         return False  # hardly ever are all others compared
-    return replace(solved, valid_from_version=held.valid_from_version) == held
-
-
-def _landmark_row(row: LandmarkSolved, place: list[float], frame: MapFrame) -> Landmark:
-    x_m, y_m, lat_deg, lon_deg, sigma_major_m, sigma_minor_m, ellipse_heading_rad, *variances_m2 = place
-    return Landmark(
-        landmark=row.landmark,
-        kind=row.kind,
-        signature=row.signature,
-        x_m=x_m,
-        y_m=y_m,
-        easting_m=x_m + frame.origin_easting_m,
-        northing_m=y_m + frame.origin_northing_m,
-        lat_deg=lat_deg,
-        lon_deg=lon_deg,
-        variance_x_m2=variances_m2[0],
-        covariance_xy_m2=variances_m2[1],
-        variance_y_m2=variances_m2[2],
-        sigma_major_m=sigma_major_m,
-        sigma_minor_m=sigma_minor_m,
-        ellipse_heading_rad=ellipse_heading_rad,
-        observation_count=row.observation_count,
-        vehicles=row.vehicles,
-        first_seen_ns=row.first_seen_ns,
-        last_seen_ns=row.last_seen_ns,
-        anchored=bool(row.anchors),
-        anchors=row.anchors,
-        provenance=provenance_json(row.observations),
-        valid_from_version=row.map_version,
-        valid_to_version=None,
-    )
+    return solved._replace(valid_from_version=held.valid_from_version) == held
 
 
 def _version_row(version: SolvedVersion, frame: MapFrame) -> MapVersion:

@@ -2,10 +2,12 @@
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
+from trigpoint.events.codec import schema_name
 from trigpoint.events.envelope import Envelope, LogPosition
 from trigpoint.events.mapped import (
     AnchorAssociated,
@@ -15,10 +17,14 @@ from trigpoint.events.mapped import (
     MapSolved,
     TrajectorySolved,
 )
+from trigpoint.events.runs import EncodedRun, LoggedRun, envelopes
 from trigpoint.events.solved import own_events
+from trigpoint.events.solved_landmarks import LandmarkDecoder, SolvedLandmarks
 
-T = TypeVar("T", TrajectorySolved, LandmarkSolved, AnchorAssociated, ImageOffsetSolved)
-Logged = tuple[LogPosition, Envelope[Mapped]]
+HEAD_SCHEMA, LANDMARK_SCHEMA = schema_name(MapSolved), schema_name(LandmarkSolved)
+
+T = TypeVar("T", TrajectorySolved, AnchorAssociated, ImageOffsetSolved)
+Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +34,7 @@ class SolvedVersion:
     position: LogPosition
     stamp_ns: int
     solved: MapSolved
-    landmarks: tuple[LandmarkSolved, ...]
+    landmarks: SolvedLandmarks
     trajectories: tuple[TrajectorySolved, ...]
     anchors: tuple[AnchorAssociated, ...]
     image_offsets: tuple[ImageOffsetSolved, ...]
@@ -39,26 +45,54 @@ class OpenVersion:
 
     A version is made of the events of its number from the same boot of the writer as its MapSolved. Events before
     a MapSolved that are not its own belong to a solve that was cut off, and are dropped. What a writer says twice
-    counts once, as it said it last.
+    counts once, as it said it last. Events are decoded when their version is closed.
     """
 
     def __init__(self) -> None:
-        self._pending: list[Envelope[Mapped]] = []
+        self._pending: list[EncodedRun] = []
+        self._decoder = LandmarkDecoder()
 
-    def after(self, position: LogPosition, envelope: Envelope[Mapped]) -> SolvedVersion | None:
-        """The version the next event of the log closes, None if it closes none."""
-        if not isinstance(envelope.event, MapSolved):
-            self._pending.append(envelope)
-            return None
-        pending, self._pending = self._pending, []
-        return _closed(position, envelope, envelope.event, pending)
+    def after(self, logged: LoggedRun) -> Iterator[SolvedVersion]:
+        """The versions the next events of the log close, in order. Raises EventRejected for an event of one of them
+        that cannot be decoded; the versions before it are told before."""
+        start = 0
+        for row in _rows_of(logged.run, HEAD_SCHEMA).tolist():
+            pending, self._pending = [*self._pending, logged.run.part(start, row)], []
+            start = row + 1
+            (closing,) = envelopes(logged.run.part(row, start))
+            position = LogPosition(logged.position.stream, logged.position.number + row)
+            yield self._closed(position, cast(Envelope[MapSolved], closing), pending)
+        self._pending.append(logged.run.part(start, len(logged.run)))
+
+    def _closed(
+        self, position: LogPosition, closing: Envelope[MapSolved], pending: Sequence[EncodedRun]
+    ) -> SolvedVersion:
+        writer = (closing.identity.source, closing.identity.boot_id)
+        runs = [run for run in pending if (run.source, run.boot_id) == writer]
+        others = own_events(closing, _other_events(runs))
+        return SolvedVersion(
+            position=position,
+            stamp_ns=closing.stamp_ns,
+            solved=closing.event,
+            landmarks=self._landmarks(runs, closing.event.map_version),
+            trajectories=tuple({(row.vehicle, row.boot_id): row for row in _of(others, TrajectorySolved)}.values()),
+            anchors=tuple({(row.anchor, row.image): row for row in _of(others, AnchorAssociated)}.values()),
+            image_offsets=tuple({row.image: row for row in _of(others, ImageOffsetSolved)}.values()),
+        )
+
+    def _landmarks(self, runs: Sequence[EncodedRun], map_version: int) -> SolvedLandmarks:
+        """The landmarks of the version among the events of its writer, each as it was said last."""
+        said = [run.picked(_rows_of(run, LANDMARK_SCHEMA)).payloads for run in runs]
+        solved = self._decoder.decoded([payload for payloads in said for payload in payloads])
+        own = solved.picked(np.flatnonzero(solved.map_versions == map_version))
+        last = {name: row for row, name in enumerate(own.landmarks)}
+        return own if len(last) == len(own) else own.picked(np.array(list(last.values()), dtype=np.int64))
 
 
-def solved_versions(rows: Iterable[Logged]) -> Iterator[SolvedVersion]:
+def solved_versions(rows: Iterable[LoggedRun]) -> Iterator[SolvedVersion]:
     """The versions closed in a stream of events in order of the log."""
     version = OpenVersion()
-    closed = (version.after(position, envelope) for position, envelope in rows)
-    return (one for one in closed if one is not None)
+    return (closed for row in rows for closed in version.after(row))
 
 
 def refusal_of(version: SolvedVersion, *, newest: int, valid: Collection[str]) -> str:
@@ -78,8 +112,9 @@ def refusal_of(version: SolvedVersion, *, newest: int, valid: Collection[str]) -
 
 def _texts(version: SolvedVersion) -> Iterator[str]:
     """Everything of a version that a database keeps as text just as it is."""
-    for landmark in version.landmarks:
-        yield from (landmark.landmark, landmark.kind, landmark.signature)
+    yield from version.landmarks.landmarks
+    yield from version.landmarks.kinds
+    yield from version.landmarks.signatures
     for path in version.trajectories:
         yield from (path.vehicle, path.boot_id)
     for anchor in version.anchors:
@@ -93,31 +128,30 @@ def landmark_count(version: SolvedVersion, valid: Collection[str]) -> int:
     if not version.solved.base_version:
         return len(version.landmarks)
     removed = set(version.solved.removed)
-    added = sum(row.landmark not in valid for row in version.landmarks if row.landmark not in removed)
+    added = sum(name not in valid for name in version.landmarks.landmarks if name not in removed)
     return len(valid) + added - sum(name in valid for name in removed)
 
 
-def _infinity_of(landmarks: Sequence[LandmarkSolved]) -> str:
-    values = np.array([(*row.position_m.flat, *row.covariance_m2.flat) for row in landmarks], dtype=np.float64)
-    finite = np.isfinite(values).all(axis=-1) if len(values) else np.empty(0)
+def _infinity_of(solved: SolvedLandmarks) -> str:
+    finite = np.isfinite(solved.positions_m).all(axis=1) & np.isfinite(solved.covariances_m2).all(axis=(1, 2))
     if finite.all():
         return ""
-    return f"landmark {landmarks[int(np.argmin(finite))].landmark!r} has a position or covariance that is not finite"
+    return f"landmark {solved.landmarks[int(np.argmin(finite))]!r} has a position or covariance that is not finite"
 
 
-def _closed(
-    position: LogPosition, closing: Envelope[Mapped], solved: MapSolved, pending: list[Envelope[Mapped]]
-) -> SolvedVersion:
-    events = own_events(closing, pending)
-    return SolvedVersion(
-        position=position,
-        stamp_ns=closing.stamp_ns,
-        solved=solved,
-        landmarks=tuple({row.landmark: row for row in _of(events, LandmarkSolved)}.values()),
-        trajectories=tuple({(row.vehicle, row.boot_id): row for row in _of(events, TrajectorySolved)}.values()),
-        anchors=tuple({(row.anchor, row.image): row for row in _of(events, AnchorAssociated)}.values()),
-        image_offsets=tuple({row.image: row for row in _of(events, ImageOffsetSolved)}.values()),
-    )
+def _rows_of(run: EncodedRun, schema: str) -> Integers:
+    """The numbers of a run's rows of a schema."""
+    if schema not in run.schemas:
+        return np.empty(0, dtype=np.int64)
+    return np.asarray(np.flatnonzero(run.schema_of_row == run.schemas.index(schema)))
+
+
+def _other_events(runs: Iterable[EncodedRun]) -> Iterator[Envelope[Mapped]]:
+    """All but the landmarks."""
+    for run in runs:
+        others = [row for schema in run.schemas if schema != LANDMARK_SCHEMA for row in _rows_of(run, schema).tolist()]
+        for envelope in envelopes(run.picked(np.array(sorted(others), dtype=np.int64))):
+            yield cast(Envelope[Mapped], envelope)
 
 
 def _of(events: Iterable[Mapped], kind: type[T]) -> Iterator[T]:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trigpoint.events.codec import Event, decode
-from trigpoint.events.envelope import Envelope, EventIdentity
+from trigpoint.events.codec import Event, decode, encode
+from trigpoint.events.envelope import Envelope, EventIdentity, LogPosition
 
 Integers = NDArray[np.int64]
 
@@ -55,6 +55,23 @@ class EncodedRun:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class LoggedRun:
+    """Events that stand in the log one behind the other, undecoded, and where the first one does."""
+
+    position: LogPosition
+    run: EncodedRun
+
+    @property
+    def next_number(self) -> int:
+        """The number after the last one's."""
+        return self.position.number + len(self.run)
+
+    def part(self, start: int, stop: int) -> "LoggedRun":
+        """The events [start, stop)."""
+        return LoggedRun(LogPosition(self.position.stream, self.position.number + start), self.run.part(start, stop))
+
+
 def joined(runs: Sequence[EncodedRun]) -> EncodedRun:
     """The rows of runs of one source and boot, at least one run, one behind the other."""
     if len(runs) == 1:
@@ -69,6 +86,20 @@ def joined(runs: Sequence[EncodedRun]) -> EncodedRun:
         sequences=np.concatenate([run.sequences for run in runs]),
         stamps_ns=np.concatenate([run.stamps_ns for run in runs]),
         payloads=[payload for run in runs for payload in run.payloads],
+    )
+
+
+def encoded(envelope: Envelope[Event]) -> EncodedRun:
+    """An event as a run of one. Raises EventRejected for a value its schema cannot hold."""
+    schema, payload = encode(envelope.event)
+    return EncodedRun(
+        source=envelope.identity.source,
+        boot_id=envelope.identity.boot_id,
+        schemas=(schema,),
+        schema_of_row=np.zeros(1, dtype=np.int64),
+        sequences=np.array([envelope.identity.sequence], dtype=np.int64),
+        stamps_ns=np.array([envelope.stamp_ns], dtype=np.int64),
+        payloads=(payload,),
     )
 
 

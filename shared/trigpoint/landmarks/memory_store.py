@@ -1,7 +1,6 @@
 """The landmark store in memory: for tests, and for maps nobody keeps."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 from trigpoint.errors import InputError
 from trigpoint.landmarks.model import (
@@ -108,7 +107,7 @@ class MemoryStore:
         found = [landmark for landmark in change.closed if landmark in valid]
         if len(found) != len(change.closed):
             raise InputError(f"map version {map_version} closes {len(change.closed)} landmarks: {len(found)} are valid")
-        ended = tuple(replace(valid.pop(landmark), valid_to_version=map_version) for landmark in found)
+        ended = tuple(valid.pop(landmark).until(map_version) for landmark in found)
         for landmark in change.opened:
             if landmark.landmark in valid:
                 raise InputError(f"map version {map_version} opens {landmark.landmark!r}: it is still valid")

@@ -4,6 +4,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,14 +40,15 @@ class MapVersion:
     operation_accuracy_m: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Landmark:
+class Landmark(NamedTuple):
     """One landmark as it stood over the half-open range of map versions [valid_from_version, valid_to_version).
 
     `landmark` is its id, stable between versions. x, y in the map frame; easting, northing in the map's CRS;
     latitude and longitude on WGS84. Variances and covariance along grid east (x) and grid north (y); sigma_* are
     the semi-axes of the 1-sigma ellipse, `ellipse_heading_rad` of the longer one counter-clockwise from grid east.
     `provenance` is JSON, {"vehicle/boot": [sequences of the sweeps that saw it]}. `valid_to_version` None: still valid.
+
+    A named tuple because a million of them are made, compared and copied in one replay; it is made by keyword.
     """
 
     landmark: str
@@ -73,6 +75,10 @@ class Landmark:
     provenance: str
     valid_from_version: int
     valid_to_version: int | None
+
+    def until(self, map_version: int) -> "Landmark":
+        """The same, no longer valid from a version on."""
+        return Landmark(*self[:-1], map_version)
 
     @property
     def covariance_m2(self) -> Floats:

@@ -1,7 +1,7 @@
 """Several consecutive map versions as one change: what comes and goes within them is never among the valid rows."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from trigpoint.errors import InputError
 from trigpoint.landmarks.model import Landmark, MapChange
@@ -30,7 +30,7 @@ def net_change(changes: Sequence[MapChange]) -> NetChange:
         for name in change.closed:
             row = opened.pop(name, None)
             if row is not None:
-                ended.append(replace(row, valid_to_version=map_version))
+                ended.append(row.until(map_version))
             elif name not in closed:
                 closed[name] = map_version
             else:

@@ -8,6 +8,7 @@ from trigpoint.landmarks.geopackage_geometry import WKB_LINE_STRING, WKB_POINT, 
 HAS_SRID = 0x20000000
 
 _POINT = struct.Struct("<BIIdd")
+POINT_BYTES = _POINT.size
 _HEADER = struct.Struct("<BIII")
 
 

@@ -5,8 +5,10 @@ from itertools import islice
 from types import MappingProxyType
 
 from trigpoint.errors import TrigpointError
+from trigpoint.events.runs import LoggedRun
 from trigpoint.logs.ports import EventLog, LoggedEvent
 
+UNBOUNDED_BYTES = 2**63
 Wanted = Callable[[str], bool]
 
 
@@ -97,3 +99,58 @@ class StreamFollower:
                 return None
             self._readings[stream] = (self._log.read(stream, first_number=first, kinds=self._kinds), end)
         return self._readings[stream]
+
+
+class RunFollower:
+    """The events of one stream that were not taken yet, from `first_number` on, undecoded. Not for several threads."""
+
+    def __init__(self, log: EventLog, stream: str, *, first_number: int = 0, kinds: Sequence[type] | None = None):
+        self._log, self._stream, self._kinds = log, stream, kinds
+        self._next = first_number
+        self._reading: Iterator[LoggedRun] | None = None
+        self._end = first_number  # which it reaches at least
+        self._left: LoggedRun | None = None  # of what was read
+        self._error: Exception | None = None  # to be raised by the next take
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether the last take left something that was there when it began to read."""
+        return self._reading is not None or self._left is not None
+
+    def take(self, limit: int, *, limit_bytes: int = UNBOUNDED_BYTES) -> list[LoggedRun]:
+        """At most so many new events, in order; fewer where payloads add up to `limit_bytes`, none if there is nothing
+        new.
+
+        Raises LogDamaged as reading does, once everything before the damage was taken.
+        """
+        taken: list[LoggedRun] = []
+        wanted, taken_bytes = limit, 0
+        while wanted and taken_bytes < limit_bytes and (row := self._following()) is not None:
+            part = row if len(row.run) <= wanted else row.part(0, wanted)
+            self._left = row.part(wanted, len(row.run)) if len(row.run) > wanted else None
+            self._next = part.next_number
+            wanted -= len(part.run)
+            taken_bytes += sum(map(len, part.run.payloads))
+            taken.append(part)
+        if self._error is not None and not taken:
+            error, self._error = self._error, None
+            raise error
+        return taken
+
+    def _following(self) -> LoggedRun | None:
+        """The next run, None at the end and where an error is to be raised."""
+        if self._left is not None or self._error is not None:
+            return self._left
+        if self._reading is None:
+            self._end = max(self._next, self._log.next_number(self._stream))
+            if self._end == self._next:
+                return None
+            self._reading = self._log.read_runs(self._stream, first_number=self._next, kinds=self._kinds)
+        try:
+            found = next(self._reading, None)
+        except (TrigpointError, OSError) as error:
+            self._error, self._reading = error, None
+            return None
+        if found is None:  # read to its end
+            self._next, self._reading = max(self._end, self._next), None
+        return found

@@ -2,12 +2,11 @@
 
 import threading
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
-import numpy as np
-
-from trigpoint.events.codec import Event, schema_name
+from trigpoint.events.codec import Event
 from trigpoint.events.envelope import Envelope, LogPosition
-from trigpoint.events.runs import EncodedRun, envelopes
+from trigpoint.events.runs import EncodedRun, LoggedRun, encoded, envelopes
 from trigpoint.logs.absences import Absence
 from trigpoint.logs.channels import packed_rows
 from trigpoint.logs.log_files import valid_stream
@@ -50,19 +49,17 @@ class MemoryLog:
             if not early and not late and (kinds is None or isinstance(row.event, tuple(kinds))):
                 yield LoggedEvent(LogPosition(stream, number), row)
 
+    def read_runs(
+        self, stream: str, *, first_number: int = 0, kinds: Sequence[type] | None = None
+    ) -> Iterator[LoggedRun]:
+        """What `read` gives, each a run of one."""
+        for row in self.read(stream, first_number=first_number, kinds=kinds):
+            yield LoggedRun(row.position, encoded(row.envelope))
+
     def read_headers(self, stream: str) -> Iterator[EncodedRun]:
         """Identities, schemas and times of the events that are there, each a run of one."""
         for row in self.read(stream):
-            identity, stamp_ns = row.envelope.identity, row.envelope.stamp_ns
-            yield EncodedRun(
-                source=identity.source,
-                boot_id=identity.boot_id,
-                schemas=(schema_name(type(row.envelope.event)),),
-                schema_of_row=np.zeros(1, dtype=np.int64),
-                sequences=np.array([identity.sequence], dtype=np.int64),
-                stamps_ns=np.array([stamp_ns], dtype=np.int64),
-                payloads=(),
-            )
+            yield replace(encoded(row.envelope), payloads=())
 
     def streams(self) -> tuple[str, ...]:
         """The names of all streams that hold an event, sorted."""

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from landmark_maps.examples import CRS, change, checkpoint, frame, solved_landmark
+from trigpoint.events.solved_landmarks import in_columns
 from trigpoint.landmarks.geopackage_query import LANDMARK_TABLES, QueryShape, bound_box, grid_window, landmark_sql
 from trigpoint.landmarks.geopackage_store import GeoPackageStore
 from trigpoint.landmarks.model import Landmark, MapChange
@@ -44,7 +45,7 @@ class Filled:
 def filled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Filled]:
     points_m = np.random.default_rng(7).uniform(0.0, SIDE_M, (LANDMARK_COUNT, 2)).tolist()
     solved = [solved_landmark(f"L{index}", x_m, y_m) for index, (x_m, y_m) in enumerate(points_m)]
-    whole = change(1, opened=landmark_rows(solved, frame()))
+    whole = change(1, opened=landmark_rows(in_columns(solved), frame()))
     path = tmp_path_factory.mktemp("speed") / "landmarks.gpkg"
     store = GeoPackageStore(path)
     wall_s = timed_s(lambda: store.apply(whole, checkpoint(1)))

@@ -13,6 +13,7 @@ from sqlalchemy import text
 
 from landmark_maps.examples import ORIGIN, change, checkpoint, landmark, solved_landmark, version_row, whole_change
 from trigpoint.events.envelope import LogPosition
+from trigpoint.events.solved_landmarks import in_columns
 from trigpoint.geodesy.positions import GridPosition
 from trigpoint.geodesy.projection import pin_map_frame
 from trigpoint.landmarks import tables
@@ -104,7 +105,9 @@ def test_gdal_transforms_to_the_degrees_the_row_holds(path: Path) -> None:
 
 def test_a_crs_without_an_authority_is_placed_by_its_definition(tmp_path: Path) -> None:
     local = "+proj=tmerc +lat_0=-33.9 +lon_0=151.2 +k=1 +x_0=5000 +y_0=5000 +ellps=GRS80 +towgs84=0,0,0 +units=m"
-    (row,) = landmark_rows([solved_landmark("L1", 1.0, 2.0)], pin_map_frame(crs=local, origin=GridPosition(5e3, 5e3)))
+    (row,) = landmark_rows(
+        in_columns([solved_landmark("L1", 1.0, 2.0)]), pin_map_frame(crs=local, origin=GridPosition(5e3, 5e3))
+    )
     version = replace(version_row(), crs=local, origin_easting_m=5e3, origin_northing_m=5e3)
     store = GeoPackageStore(tmp_path / "local.gpkg")
     store.apply(replace(change(1, opened=[row]), version=version), checkpoint(1))

@@ -9,19 +9,18 @@ import pytest
 
 from landmark_maps.examples import (
     LABEL_STREAM,
-    MAP_STREAM,
     ORIGIN,
-    START_NS,
     associated,
     closing,
     frame,
     label,
+    logged,
     solved_landmark,
     solved_map,
     whole_change,
 )
 from trigpoint.events.corrected import AnchorRetracted, Corrected
-from trigpoint.events.envelope import Envelope, EventIdentity, LogPosition
+from trigpoint.events.envelope import LogPosition
 from trigpoint.events.mapped import LandmarkSolved, Mapped
 from trigpoint.landmarks.model import Landmark, MapChange
 from trigpoint_landmarks.core.rows import labels_within, make_valid, map_change
@@ -30,11 +29,7 @@ from trigpoint_landmarks.core.versions import solved_versions
 
 def changed(map_version: int, landmarks: list[LandmarkSolved], held: MapChange | None = None) -> MapChange:
     """The change a version of these landmarks makes after `held`."""
-    rows = [
-        (LogPosition(MAP_STREAM, number), Envelope(EventIdentity("optimisation", "boot-1", number), START_NS, event))
-        for number, event in enumerate(solved_map(map_version, landmarks))
-    ]
-    (version,) = solved_versions(rows)
+    (version,) = solved_versions(logged(solved_map(map_version, landmarks)))
     return map_change(version, frame=frame(), labels={}, valid=valid_with(held) if held else {})
 
 
@@ -134,11 +129,7 @@ def test_one_name_in_two_images_is_two_anchors() -> None:
         replace(associated("anchor-1", "L1"), image="tile-2"),
         closing(1, 0),
     ]
-    rows = [
-        (LogPosition(MAP_STREAM, number), Envelope(EventIdentity("optimisation", "boot-1", number), START_NS, event))
-        for number, event in enumerate(events)
-    ]
-    (version,) = solved_versions(rows)
+    (version,) = solved_versions(logged(events))
     anchors = map_change(version, frame=frame(), labels=labels, valid={}).anchors
     assert [(row.image, row.lat_deg) for row in anchors] == [("tile-1", -33.89), ("tile-2", -33.0)]
 
@@ -151,11 +142,7 @@ def delta(map_version: int, landmarks: list[LandmarkSolved], *, removed: tuple[s
     """The change of a version that says only what differs from the one before."""
     head = replace(closing(map_version, 0), base_version=map_version - 1, removed=removed)
     events: list[Mapped] = [*landmarks, head]
-    rows = [
-        (LogPosition(MAP_STREAM, number), Envelope(EventIdentity("optimisation", "boot-1", number), START_NS, event))
-        for number, event in enumerate(events)
-    ]
-    (version,) = solved_versions(rows)
+    (version,) = solved_versions(logged(events))
     return map_change(version, frame=frame(), labels={}, valid=valid_with(held))
 
 

@@ -1,29 +1,22 @@
 """Which events make a map version."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from landmark_maps.examples import MAP_STREAM, START_NS, closing, solved_landmark, solved_map
-from trigpoint.events.envelope import Envelope, EventIdentity, LogPosition
+from landmark_maps.examples import MAP_STREAM, closing, logged, solved_landmark, solved_map
+from trigpoint.events.envelope import LogPosition
 from trigpoint.events.mapped import Mapped
-from trigpoint_landmarks.core.versions import Logged, SolvedVersion, refusal_of, solved_versions
+from trigpoint.events.runs import LoggedRun
+from trigpoint_landmarks.core.versions import SolvedVersion, refusal_of, solved_versions
 
 
-def logged(events: Sequence[Mapped], *, boot_id: str = "boot-1", first: int = 0) -> list[Logged]:
-    return [
-        (LogPosition(MAP_STREAM, number), Envelope(EventIdentity("optimisation", boot_id, number), START_NS, event))
-        for number, event in enumerate(events, start=first)
-    ]
-
-
-def versions(*parts: list[Logged]) -> list[SolvedVersion]:
+def versions(*parts: list[LoggedRun]) -> list[SolvedVersion]:
     return list(solved_versions(row for part in parts for row in part))
 
 
 def names(version: SolvedVersion) -> list[str]:
-    return [row.landmark for row in version.landmarks]
+    return list(version.landmarks.landmarks)
 
 
 def test_a_version_has_all_its_events_and_the_place_of_the_last() -> None:
@@ -45,7 +38,7 @@ def test_what_a_writer_that_was_cut_off_left_is_not_part_of_the_next_solve() -> 
 def test_a_solve_tried_again_in_the_same_boot_counts_once_as_said_last() -> None:
     tried = logged([solved_landmark("L1", 5.0, 5.0)])
     (version,) = versions(tried, logged(solved_map(1, [solved_landmark("L1", 0.0, 0.0)]), first=1))
-    assert [tuple(row.position_m) for row in version.landmarks] == [(0.0, 0.0)]
+    assert version.landmarks.positions_m.tolist() == [[0.0, 0.0]]
 
 
 def test_events_of_another_version_number_are_left_out() -> None:
@@ -78,7 +71,7 @@ def test_an_empty_map_is_a_version() -> None:
 
 def test_arrays_are_taken_as_they_are() -> None:
     (version,) = versions(logged(solved_map(1, [solved_landmark("L1", 0.1, 0.2)])))
-    assert np.array_equal(version.landmarks[0].position_m, [0.1, 0.2])
+    assert np.array_equal(version.landmarks.positions_m, [[0.1, 0.2]])
 
 
 def changing(
