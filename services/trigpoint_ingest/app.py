@@ -189,7 +189,6 @@ class IngestService:
     def _let_go(self) -> None:
         self._closed = True
         self._committer.shutdown()
-        self._journal.close()
         self._claims.release()
 
     def __enter__(self) -> Self:

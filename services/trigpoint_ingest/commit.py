@@ -1,29 +1,24 @@
 """Groups of events made durable, then published, then acknowledged: always in this order."""
 
 import errno
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-
-import numpy as np
 
 from trigpoint.bus.event_messages import event_message
 from trigpoint.bus.ports import Bus, BusMessage, BusRun
-from trigpoint.errors import AppendFailed
+from trigpoint.errors import AppendFailed, TrigpointError
 from trigpoint.events.codec import Event, event_class
 from trigpoint.events.envelope import Envelope
 from trigpoint.events.keys import key_of
 from trigpoint.events.runs import EncodedRun
 from trigpoint.events.uplink import observation_key
-from trigpoint.logs.ports import EventLog
+from trigpoint.logs.ports import RecallingLog
 from trigpoint.observability.metrics import Instruments
 from trigpoint_ingest.settings import IngestSettings
 
 DISK_ERRORS = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS))  # room and media: an operator mends them
 SQLITE_DISK_ERRORS = frozenset((8, 10, 13))  # SQLITE_READONLY, SQLITE_IOERR, SQLITE_FULL (sqlite.org/rescode.html)
 SQLITE_PRIMARY = 0xFF  # bits of the primary code in an extended one
-APPEND_THREADS = 16  # streams that wait for the disk at the same time
 
 Row = Envelope[Event] | EncodedRun
 
@@ -40,11 +35,10 @@ class Group:
 class GroupCommit:
     """Commits groups, one after the other."""
 
-    def __init__(self, log: EventLog, bus: Bus | None, settings: IngestSettings, instruments: Instruments) -> None:
+    def __init__(self, log: RecallingLog, bus: Bus | None, settings: IngestSettings, instruments: Instruments) -> None:
         self._log, self._bus = log, bus
         self._settings, self._instruments = settings, instruments
-        self._threads = ThreadPoolExecutor(APPEND_THREADS, thread_name_prefix="append")
-        self._following: dict[str, int] = {}  # by stream, the number its next event gets
+        self._following: dict[str, int] = {}  # by stream, the number the first row of its next group gets
         self._let_go: set[str] = set()
 
     def commit(self, group: Group) -> None:
@@ -63,53 +57,60 @@ class GroupCommit:
         for acknowledgement in group.acknowledgements:
             self._bus.publish(acknowledgement)
 
-    def close(self) -> None:
-        """No thread left."""
-        self._threads.shutdown()
-
     def _append_all(self, group: Group) -> None:
-        """Every stream's rows appended, side by side, since each waits for the disk. Raises AppendFailed."""
-        work = {stream: self._threads.submit(self._append, stream, rows) for stream, rows in group.to_append.items()}
-        with ExitStack() as errors:  # of several the last is raised, with the others as its context
-            for stream in sorted(work):
-                if work[stream].exception() is None:
-                    group.appended.append(group.to_append.pop(stream))
-                else:
-                    errors.callback(work[stream].result)
+        """Every stream's rows appended, side by side. Raises AppendFailed; of several what cannot be waited for."""
+        left, failures = self._left(group.to_append)
+        together = self._log.append_all({stream: rows for stream, rows in left.items() if rows})
+        self._let_go |= together.failures.keys()
+        for stream in sorted(left.keys() - together.failures.keys()):
+            rows = group.to_append.pop(stream)
+            self._following[stream] += sum(map(_count, rows))
+            self._let_go.discard(stream)
+            group.appended.append(rows)
+        raised = sorted([*failures, *together.failures.values()], key=_may_wait)
+        if raised:
+            raise raised[0]
 
-    def _append(self, stream: str, rows: Sequence[Row]) -> None:
-        """The rows appended, without those that an append which failed had made durable nevertheless."""
-        if stream not in self._following:
-            self._following[stream] = self._log.append(stream, ()).number + 1
-        if stream in self._let_go:
-            there = self._log.append(stream, ()).number + 1
-            rows = rows_behind(rows, there - self._following[stream])
-        self._let_go.add(stream)
-        self._following[stream] = self._log.append(stream, rows).number + 1
-        self._let_go.discard(stream)
+    def _left(self, to_append: Mapping[str, list[Row]]) -> tuple[dict[str, list[Row]], list[TrigpointError]]:
+        """The rows without those that an append which failed had made durable nevertheless, as far as that can be
+        found out, and why it cannot."""
+        left: dict[str, list[Row]] = {}
+        failures: list[TrigpointError] = []
+        for stream, rows in to_append.items():
+            try:
+                left[stream] = rows_behind(rows, self._durable_count(stream)) if self._is_unsure(stream) else rows
+            except TrigpointError as error:
+                failures.append(error)
+        return left, failures
+
+    def _is_unsure(self, stream: str) -> bool:
+        return stream in self._let_go or stream not in self._following
+
+    def _durable_count(self, stream: str) -> int:
+        """How many of a stream's rows are durable, though their append failed."""
+        there = self._log.append(stream, ()).number + 1
+        return there - self._following.setdefault(stream, there)
 
     def _publish(self, bus: Bus, rows: Sequence[Row]) -> None:
         """The rows on their keys; where nobody listens to a key, nothing is sent: the log has it."""
         heard: dict[str, bool] = {}
         for row in rows:
             if isinstance(row, EncodedRun):
-                for run in self._bus_runs(row):
-                    if _is_heard(bus, run.key, heard):
-                        bus.publish_run(run)
+                for run in self._bus_runs(row, lambda key: _is_heard(bus, key, heard)):
+                    bus.publish_run(run)
             else:
                 key = key_of(row, root=self._settings.root, map_name=self._settings.map_name)
                 if _is_heard(bus, key, heard):
                     bus.publish(event_message(row, key=key))
 
-    def _bus_runs(self, run: EncodedRun) -> list[BusRun]:
-        """The run as it is published: each class of events on its key. A schema no row has may be anything."""
-        runs = []
-        for number in np.unique(run.schema_of_row).tolist():
-            kind = event_class(run.schemas[number])
-            if kind is not None:
-                key = observation_key(run.source, kind, root=self._settings.root)
-                runs.append(BusRun(key, 1, of_schema(run, number)))
-        return runs
+    def _bus_runs(self, run: EncodedRun, is_heard: Callable[[str], bool]) -> Iterator[BusRun]:
+        """The run as it is published: each class of events on its key, where somebody listens to that. A schema no
+        row has may be anything."""
+        for number, schema in enumerate(run.schemas):
+            kind = event_class(schema)
+            key = "" if kind is None else observation_key(run.source, kind, root=self._settings.root)
+            if key and is_heard(key) and (run.schema_of_row == number).any():
+                yield BusRun(key, 1, of_schema(run, number))
 
 
 def _is_heard(bus: Bus, key: str, heard: dict[str, bool]) -> bool:
@@ -133,11 +134,15 @@ def of_schema(run: EncodedRun, number: int) -> EncodedRun:
     )
 
 
+def _count(row: Row) -> int:
+    return len(row) if isinstance(row, EncodedRun) else 1
+
+
 def rows_behind(rows: Sequence[Row], count: int) -> list[Row]:
     """The rows without the first `count` events."""
     left: list[Row] = []
     for row in rows:
-        size = len(row) if isinstance(row, EncodedRun) else 1
+        size = _count(row)
         skipped = min(size, max(count, 0))
         count -= skipped
         if skipped == 0:
@@ -145,6 +150,10 @@ def rows_behind(rows: Sequence[Row], count: int) -> list[Row]:
         elif isinstance(row, EncodedRun) and skipped < size:
             left.append(row.part(skipped, size))
     return left
+
+
+def _may_wait(error: TrigpointError) -> bool:
+    return isinstance(error, AppendFailed) and waits_for_disk(error)
 
 
 def waits_for_disk(error: AppendFailed) -> bool:

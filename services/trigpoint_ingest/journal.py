@@ -154,13 +154,11 @@ class Journal:
         self.commit(self._unfinished)
         self._unfinished = None
 
-    def close(self) -> None:
-        """No thread left; what is pending stays so."""
-        self._commit.close()
-
 
 def _stretches(run: EncodedRun, plain: NDArray[np.bool_]) -> list[tuple[EncodedRun, bool]]:
     """The run cut where plain messages and others meet; plain stretches that are short count as others."""
+    if plain.all():
+        return [(run, True)]
     edges = [0, *(np.flatnonzero(np.diff(plain)) + 1).tolist(), len(run)]
     cuts: list[tuple[int, int, bool]] = []
     for start, stop in pairwise(edges):

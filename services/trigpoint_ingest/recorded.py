@@ -1,7 +1,6 @@
 """Vehicles' logs, whole MCAP files, taken into the log message by message; damage costs only what it hit."""
 
 from collections.abc import Callable, Sequence
-from contextlib import closing
 from pathlib import Path
 
 from trigpoint.bus.ports import Bus
@@ -38,9 +37,9 @@ def ingest_logs(
         if not path.is_file():
             raise InputError(f"{path} is not a file: an MCAP log of a vehicle is needed")
     chosen = settings if settings is not None else IngestSettings()
-    with closing(Journal(log, bus, chosen)) as journal:
-        for path in paths:
-            _ingest_file(path, journal, batch_count=chosen.batch_count, progress=progress or _nobody)
+    journal = Journal(log, bus, chosen)
+    for path in paths:
+        _ingest_file(path, journal, batch_count=chosen.batch_count, progress=progress or _nobody)
     return journal.tally.report()
 
 

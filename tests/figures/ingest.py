@@ -3,13 +3,13 @@
 Payloads are sweeps of landmarks filled up to the size: what vehicles may send that comes near a point cloud's 500 kB.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 
 from figures.figure import Bounds, Figure, Measurement, at_least, at_most
 from figures.workbench import Workbench
-from ingest_load.racing import VEHICLES, Race, latency_s, median, raced
+from ingest_load.racing import VEHICLES, Race, Waited, median, raced, waited
 
 SMALL_BYTES, SMALL_MESSAGES = 256, 30_000  # of each vehicle
 LARGE_BYTES, LARGE_MESSAGES = 500_000, 120
@@ -50,13 +50,23 @@ def rate(name: str, *, size_bytes: int, messages: int) -> Figure:
     return Figure(name=name, unit="messages/s", target=None, measure=measure)
 
 
-def acknowledgement_latency(bench: Workbench) -> Measurement:
-    """The 99th percentile at a fifth of the rate measured before."""
-    rate_hz = LATENCY_SHARE * median([race.ingest_per_s for race in races(bench.folder, SMALL_BYTES, SMALL_MESSAGES)])
+@cache
+def _waited(folder: Path) -> tuple[Waited, str]:
+    """How long messages waited at a fifth of the rate measured before, and the command; once a run."""
+    rate_hz = LATENCY_SHARE * median([race.ingest_per_s for race in races(folder, SMALL_BYTES, SMALL_MESSAGES)])
     messages = round(rate_hz * LATENCY_RUN_S / VEHICLES)
-    value = latency_s(bench.folder / "latency", messages=messages, size_bytes=SMALL_BYTES, rate_hz=rate_hz)
     shown = f"{_shown(SMALL_BYTES, messages, 'trigpoint serve ingest')} --rate {rate_hz:.0f}"
-    return Measurement(value=value, command=shown)
+    return waited(folder / "latency", messages=messages, size_bytes=SMALL_BYTES, rate_hz=rate_hz), shown
+
+
+def of_waiting(name: str, value_of: Callable[[Waited], float], target: Bounds | None) -> Figure:
+    """A time at a fifth of the rate."""
+
+    def measure(bench: Workbench) -> Measurement:
+        found, shown = _waited(bench.folder)
+        return Measurement(value=value_of(found), command=shown)
+
+    return Figure(name=f"{name} at {LATENCY_SHARE:.0%} of that rate, p99", unit="s", target=target, measure=measure)
 
 
 def _shown(size_bytes: int, messages: int, receiver: str) -> str:
@@ -78,10 +88,6 @@ FIGURES = (
         messages=LARGE_MESSAGES,
     ),
     rate(f"durable ingest, {LARGE_BYTES // 1000} kB", size_bytes=LARGE_BYTES, messages=LARGE_MESSAGES),
-    Figure(
-        name=f"acknowledgement at {LATENCY_SHARE:.0%} of that rate, p99",
-        unit="s",
-        target=at_most(LATENCY_LIMIT_S),
-        measure=acknowledgement_latency,
-    ),
+    of_waiting("acknowledgement", lambda one: one.p99_s, at_most(LATENCY_LIMIT_S)),
+    of_waiting("of it until handed over by these vehicles", lambda one: one.late_p99_s, None),
 )

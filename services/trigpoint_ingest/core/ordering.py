@@ -85,7 +85,10 @@ class RunOrder:
         """
         everything = joined(runs if self._held is None else (self._held, *runs))
         ordered = _ascending(everything)
-        sequences = ordered.sequences
+        sequences, doubled = ordered.sequences, len(everything) - len(ordered)
+        if sequences[0] == self._next and sequences[-1] == self._next + len(sequences) - 1:
+            self._next, self._held = self._next + len(sequences), None
+            return Released(None, ordered, doubled)
         old = int(np.searchsorted(sequences, self._next))
         stop = old + _run_length(sequences[old:], self._next)
         if stop > old:
@@ -93,7 +96,7 @@ class RunOrder:
         kept = min(len(ordered), stop + self._capacity)
         self.overflowed += len(ordered) - kept
         self._held = _part(ordered, stop, kept)
-        return Released(_part(ordered, 0, old), _part(ordered, old, stop), len(everything) - len(ordered))
+        return Released(_part(ordered, 0, old), _part(ordered, old, stop), doubled)
 
     def give_up(self) -> EncodedRun | None:
         """Everything held, in order: what is missing is not waited for any longer."""

@@ -9,11 +9,14 @@ import numpy as np
 
 from trigpoint.bus.attachment import (
     BUNDLE_LIMIT,
+    Bytes,
     attachment_columns,
+    attachment_table,
     bundled_count,
     decode_attachment,
     decode_bundle,
     is_bundle,
+    uniform_bundle,
 )
 from trigpoint.bus.ports import UNIDENTIFIED, BusMessage, BusRun
 from trigpoint.errors import InputError
@@ -46,11 +49,11 @@ def messages_of(arrival: Arrival) -> list[BusMessage]:
 
 def runs_of(arrival: Arrival) -> list[BusRun]:
     """The same, column by column: a run for each stretch of messages of one source, boot and schema version."""
-    bundled = _bundled(arrival)
+    bundled = _bundled_table(arrival)
     if bundled is None:
-        return [run_of_messages([_message(arrival, arrival.attachment, arrival.payload)])]
-    attachments, payloads = bundled
-    columns = attachment_columns(attachments)
+        return list(runs_of_messages(messages_of(arrival)))
+    table, payloads = bundled
+    columns = attachment_columns(table)
     if columns is None:
         return list(runs_of_messages(messages_of(arrival)))
     identity, schema_version, sequences, stamps_ns = columns
@@ -105,6 +108,16 @@ def _bundled(arrival: Arrival) -> tuple[list[bytes], list[bytes]] | None:
         if 0 < len(payloads) <= BUNDLE_LIMIT:
             return attachments, payloads
     return None
+
+
+def _bundled_table(arrival: Arrival) -> tuple[Bytes, list[bytes]] | None:
+    """The same, the attachments as rows (n, L); None also where they are not all of one length."""
+    uniform = uniform_bundle(arrival.payload) if is_bundle(arrival.attachment) else None
+    if uniform is not None and 0 < len(uniform[1]) <= BUNDLE_LIMIT:
+        return uniform
+    bundled = _bundled(arrival)
+    table = None if bundled is None else attachment_table(bundled[0])
+    return None if bundled is None or table is None else (table, bundled[1])
 
 
 def _message(arrival: Arrival, attachment: bytes, payload: bytes) -> BusMessage:

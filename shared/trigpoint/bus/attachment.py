@@ -11,10 +11,13 @@ import struct
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trigpoint.errors import InputError
 from trigpoint.events.envelope import EventIdentity
 from trigpoint.events.runs import EncodedRun, Integers
+
+Bytes = NDArray[np.uint8]
 
 LAYOUT_VERSION = 1
 BUNDLE_VERSION = 2
@@ -88,22 +91,42 @@ def decode_bundle(payload: bytes) -> tuple[list[bytes], list[bytes]]:
     return attachments, payloads
 
 
-def attachment_columns(attachments: Sequence[bytes]) -> tuple[EventIdentity, int, Integers, Integers] | None:
-    """Source and boot (in an identity of the first message), schema version, sequences (n,) and stamps in ns (n,) of
-    attachments that differ in nothing else; None if they do, or are not ours.
-    """
-    joined, length = b"".join(attachments), len(attachments[0])
-    if length < _HEAD.size or any(len(attachment) != length for attachment in attachments):
+def uniform_bundle(payload: bytes) -> tuple[Bytes, list[bytes]] | None:
+    """Attachments (n, L) and payloads of a bundle of messages that are all as long as the first; None for another."""
+    if len(payload) < _LENGTHS.size:
         return None
-    table = np.frombuffer(joined, dtype=np.uint8).reshape(len(attachments), length)
-    shared = np.concatenate([table[:, :_SEQUENCE_AT], table[:, _HEAD.size :]], axis=1)
-    if (shared != shared[0]).any():
+    attachment_length, payload_length = _LENGTHS.unpack_from(payload)
+    payload_at = _LENGTHS.size + attachment_length
+    stride = payload_at + payload_length
+    if len(payload) % stride:
+        return None
+    table = np.frombuffer(payload, dtype=np.uint8).reshape(-1, stride)
+    if (table[:, : _LENGTHS.size] != table[0, : _LENGTHS.size]).any():
+        return None
+    starts = range(0, len(payload), stride)
+    return table[:, _LENGTHS.size : payload_at], [payload[start + payload_at : start + stride] for start in starts]
+
+
+def attachment_table(attachments: Sequence[bytes]) -> Bytes | None:
+    """Attachments (n, L) of one length, or None."""
+    length = len(attachments[0])
+    if any(len(attachment) != length for attachment in attachments):
+        return None
+    return np.frombuffer(b"".join(attachments), dtype=np.uint8).reshape(len(attachments), length)
+
+
+def attachment_columns(table: Bytes) -> tuple[EventIdentity, int, Integers, Integers] | None:
+    """Source and boot (in an identity of the first message), schema version, sequences (n,) and stamps in ns (n,) of
+    attachments (n, L) that differ in nothing else; None if they do, or are not ours.
+    """
+    before, behind = table[:, :_SEQUENCE_AT], table[:, _HEAD.size :]
+    if (before != before[0]).any() or (behind != behind[0]).any():
         return None
     try:
-        identity, _, schema_version = decode_attachment(attachments[0])
+        identity, _, schema_version = decode_attachment(table[0].tobytes())
     except InputError:
         return None
-    numbers = np.ascontiguousarray(table[:, _SEQUENCE_AT : _HEAD.size]).view("<i8").astype(np.int64)
+    numbers = np.ascontiguousarray(table[:, _SEQUENCE_AT : _HEAD.size]).view("<i8").astype(np.int64, copy=False)
     return identity, schema_version, numbers[:, 0], numbers[:, 1]
 
 

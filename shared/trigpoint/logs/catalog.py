@@ -86,6 +86,14 @@ class CatalogEntry:
 
 
 @dataclass(frozen=True, slots=True)
+class CatalogGrowth:
+    """What came to a file that was known with `known_bytes`, and its state by now."""
+
+    entry: CatalogEntry
+    known_bytes: int
+
+
+@dataclass(frozen=True, slots=True)
 class FileContents:
     """A file's share of a log: numbers [first, first + count), times [start, end], vehicles and topics."""
 
@@ -151,20 +159,21 @@ class Catalog:
         """The connection closed."""
         self._connection.close()
 
-    def add(self, entry: CatalogEntry, *, known_bytes: int) -> None:
-        """More chunks and channels of a file entered, and its state replaced, in one transaction.
+    def add_all(self, grown: Sequence[CatalogGrowth]) -> None:
+        """More chunks and channels of files entered, and their states replaced, in one transaction.
 
-        Raises CatalogRenewed if the file is not known with the size it had before.
+        Raises CatalogRenewed if one of the files is not known with the size it had before.
         """
-        self._asked(lambda: self._add(entry, known_bytes))
+        self._asked(lambda: self._add_all(grown))
 
-    def _add(self, entry: CatalogEntry, known_bytes: int) -> None:
-        key = (entry.file.stream, entry.file.first_number)
+    def _add_all(self, grown: Sequence[CatalogGrowth]) -> None:
         with self._connection:
-            rows = self._rows("SELECT size_bytes FROM file WHERE stream = ? AND first_number = ?", key)
-            if rows != [(known_bytes,)]:
-                raise CatalogRenewed(f"{self._path}: {key} is not known with {known_bytes} bytes")
-            self._insert(entry)
+            for growth in grown:
+                key = (growth.entry.file.stream, growth.entry.file.first_number)
+                rows = self._rows("SELECT size_bytes FROM file WHERE stream = ? AND first_number = ?", key)
+                if rows != [(growth.known_bytes,)]:
+                    raise CatalogRenewed(f"{self._path}: {key} is not known with {growth.known_bytes} bytes")
+            self._insert([growth.entry for growth in grown])
 
     def replace(self, entry: CatalogEntry) -> None:
         """All that was known of a file replaced by this, in one transaction; not where more of its chunks are known.
@@ -178,7 +187,7 @@ class Catalog:
             self._connection.execute("BEGIN IMMEDIATE")
             if self._chunk_count(entry.file) <= len(entry.chunks):
                 self._delete(entry.file)
-                self._insert(entry)
+                self._insert([entry])
 
     def remove(self, file: CatalogFile) -> None:
         """A file forgotten with all that was in it."""
@@ -189,20 +198,20 @@ class Catalog:
 
         self._asked(removed)
 
-    def _insert(self, entry: CatalogEntry) -> None:
-        file, execute_many = entry.file, self._connection.executemany
-        key = (file.stream, file.first_number)
+    def _insert(self, entries: Sequence[CatalogEntry]) -> None:
+        execute_many = self._connection.executemany
+        keys = [(entry, (entry.file.stream, entry.file.first_number)) for entry in entries]
         execute_many(
             "INSERT OR REPLACE INTO file VALUES (?, ?, ?, ?, ?, ?)",
-            [_checked((*key, file.size_bytes, int(file.finished), file.damage))],
+            [_checked((*key, *_file_values(entry.file))) for entry, key in keys],
         )
         execute_many(
             "INSERT OR REPLACE INTO chunk VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-            [_checked((*key, *_chunk_values(chunk))) for chunk in entry.chunks],
+            [_checked((*key, *_chunk_values(chunk))) for entry, key in keys for chunk in entry.chunks],
         )
         execute_many(
             "INSERT OR REPLACE INTO channel VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-            [_checked((*key, channel_id, *_channel_values(channel))) for channel_id, channel in entry.channels],
+            [_checked((*key, number, *_channel_values(one))) for entry, key in keys for number, one in entry.channels],
         )
 
     def _chunk_count(self, file: CatalogFile) -> int:
@@ -376,17 +385,15 @@ def _chunk_of(*values: Any) -> CatalogChunk:
     return CatalogChunk(*numbers, tuple(map(int, channel_ids.split())))  # type: ignore[call-arg]  # a row has 8
 
 
+def _file_values(file: CatalogFile) -> tuple[object, ...]:
+    return file.size_bytes, int(file.finished), file.damage
+
+
 def _chunk_values(chunk: CatalogChunk) -> tuple[object, ...]:
     place = (chunk.number, chunk.count, chunk.start_ns, chunk.end_ns, chunk.offset, chunk.length)
     return (*place, " ".join(map(str, chunk.channel_ids)))
 
 
 def _channel_values(channel: ChannelKey) -> tuple[object, ...]:
-    return (
-        channel.topic,
-        channel.schema_name,
-        channel.source,
-        channel.boot_id,
-        channel.vehicle,
-        channel.sequence_base,
-    )
+    names = (channel.topic, channel.schema_name, channel.source, channel.boot_id, channel.vehicle)
+    return (*names, channel.sequence_base)

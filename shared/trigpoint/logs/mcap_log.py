@@ -2,33 +2,34 @@
 
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import BinaryIO, TypeVar
-
-from mcap.opcode import Opcode
-from mcap.records import Chunk
+from typing import TypeVar
 
 from trigpoint.errors import LogDamaged
 from trigpoint.events.codec import Event, decode, event_class
 from trigpoint.events.envelope import Envelope, LogPosition
 from trigpoint.events.keys import DEFAULT_MAP, STREAM_PATTERNS
 from trigpoint.events.observed import MapFramePinned, VehicleDescribed
-from trigpoint.events.runs import EncodedRun, LoggedRun
+from trigpoint.events.runs import EncodedRun
 from trigpoint.logs.absences import NAME as ABSENCES_NAME
 from trigpoint.logs.absences import Absence, recorded_absences
+from trigpoint.logs.append_together import append_together
 from trigpoint.logs.catalog import NAME, Catalog, CatalogChunk, CatalogFile, FileContents, renewed_once
-from trigpoint.logs.channels import ChannelKey, PackedRows, packed_rows
-from trigpoint.logs.chunks import FRAME, messages, parsed, unpacked
-from trigpoint.logs.headers import chunk_headers, chunk_runs, index_bytes
+from trigpoint.logs.channels import ChannelKey, packed_rows
+from trigpoint.logs.chunk_reading import chunk_data, opened, taken_away
+from trigpoint.logs.chunks import messages
+from trigpoint.logs.headers import chunk_headers, index_bytes
 from trigpoint.logs.log_files import bring_up_to_date, file_path, has_writer, valid_stream
-from trigpoint.logs.ports import LoggedBoot, LoggedEvent
+from trigpoint.logs.ports import AppendedTogether, LoggedBoot, LoggedEvent
 from trigpoint.logs.stream_writer import Rotation, StreamWriter
 
 DEFAULT_ROTATION = Rotation()
+SYNC_THREADS = 16  # streams that wait for the disk at the same time: one journal commit serves them all
 AnswerT = TypeVar("AnswerT")
-ChunkRecords = tuple[CatalogChunk, bytes, bytes, dict[int, ChannelKey]]
 Mark = tuple[int, int]  # a stream's last file and when, in ns, files came or went
 
 
@@ -85,6 +86,7 @@ class McapLog:
         self._writers: dict[str, StreamWriter] = {}
         self._append_locks: dict[str, threading.Lock] = {}
         self._lock = threading.RLock()
+        self._syncing = ThreadPoolExecutor(SYNC_THREADS, thread_name_prefix="fsync")
         try:
             renewed_once(self._bring_all_up_to_date)
         except BaseException:
@@ -103,21 +105,43 @@ class McapLog:
         stamp or sequence no log can hold, EventRejected for a value its schema cannot hold.
         """
         valid_stream(stream)
-        with self._lock:
-            own = self._append_locks.setdefault(stream, threading.Lock())
-        with own:  # one stream waits for its disk while others pack
+        with self._append_lock(stream):  # one stream waits for its disk while others pack
             ready = packed_rows(rows) if rows else None
             writer = self._writer(stream)
             if ready:
-                self._append(writer, stream, ready)
+                with self._forgotten_if_let_go((stream,)):
+                    writer.append(ready, self._metadata(stream, ready.channels[0].vehicle))
             return LogPosition(stream, writer.next_number - 1)
 
-    def _append(self, writer: StreamWriter, stream: str, rows: PackedRows) -> None:
+    def append_all(self, rows_by_stream: Mapping[str, Sequence[Envelope[Event] | EncodedRun]]) -> AppendedTogether:
+        """Of each stream what `append` gives or raises; they wait for the disk at the same time."""
+        with ExitStack() as held:
+            for stream in sorted(rows_by_stream):
+                held.enter_context(self._append_lock(stream))
+            writes = {stream: partial(self._write, stream, rows) for stream, rows in rows_by_stream.items()}
+            with self._forgotten_if_let_go(tuple(rows_by_stream)):
+                failures = append_together(self._catalog, writes, self._syncing)
+            done = [stream for stream in rows_by_stream if stream not in failures]
+            positions = {stream: LogPosition(stream, self._writers[stream].next_number - 1) for stream in done}
+            return AppendedTogether(positions, failures)
+
+    def _write(self, stream: str, rows: Sequence[Envelope[Event] | EncodedRun]) -> StreamWriter:
+        ready, writer = packed_rows(rows), self._writer(valid_stream(stream))
+        writer.write(ready, self._metadata(stream, ready.channels[0].vehicle))
+        return writer
+
+    @contextmanager
+    def _forgotten_if_let_go(self, streams: Sequence[str]) -> Iterator[None]:
         try:
-            writer.append(rows, self._metadata(stream, rows.channels[0].vehicle))
-        except BaseException:
-            del self._writers[stream]
-            raise
+            yield
+        finally:
+            for stream in streams:
+                if stream in self._writers and self._writers[stream].is_let_go:
+                    del self._writers[stream]
+
+    def _append_lock(self, stream: str) -> threading.Lock:
+        with self._lock:
+            return self._append_locks.setdefault(stream, threading.Lock())
 
     def _writer(self, stream: str) -> StreamWriter:
         if stream not in self._writers:
@@ -151,29 +175,14 @@ class McapLog:
 
         Raises LogDamaged as `read` does.
         """
-        for chunk, data, indexes, channels in self._chunk_records(stream, _Wanted(0, None, None, None)):
-            yield from chunk_headers(data, indexes, chunk.count, channels)
-
-    def read_runs(
-        self, stream: str, *, first_number: int = 0, kinds: Sequence[type] | None = None
-    ) -> Iterator[LoggedRun]:
-        """What `read` gives, many events at once and none decoded. Raises LogDamaged as `read` does."""
-        wanted = _Wanted(first_number, None, None, frozenset(kinds) if kinds is not None else None)
-        for chunk, data, indexes, channels in self._chunk_records(stream, wanted):
-            for place, run in chunk_runs(data, indexes, chunk.count, channels):
-                found = LoggedRun(LogPosition(stream, chunk.number + place), run)
-                if found.next_number > first_number:
-                    yield found.part(max(0, first_number - found.position.number), len(run))
-
-    def _chunk_records(self, stream: str, wanted: _Wanted) -> Iterator[ChunkRecords]:
-        """The chunks that may hold what is wanted, with their records, their message indexes and wanted channels."""
-        for first, chunks in self._chunks_by_file(stream, wanted):
-            channels = wanted.channels(self._channels(stream, first, chunks))
+        for first, chunks in self._chunks_by_file(stream, _Wanted(0, None, None, None)):
+            channels = self._channels(stream, first, chunks)
             path = file_path(self.directory / stream, first)
-            with _opened(path, chunks) as file:
+            with opened(path, chunks) as file:
                 for chunk in chunks:
-                    data = _chunk_data(file, path, chunk)
-                    yield chunk, data, file.read(index_bytes(chunk.count, len(chunk.channel_ids))), channels
+                    data = chunk_data(file, path, chunk)
+                    indexes = file.read(index_bytes(chunk.count, len(chunk.channel_ids)))
+                    yield from chunk_headers(data, indexes, chunk.count, channels)
 
     def _chunks_by_file(self, stream: str, wanted: _Wanted) -> Iterator[tuple[int, list[CatalogChunk]]]:
         """The files with chunks that may hold what is wanted; LogDamaged raised behind the first damaged one."""
@@ -203,17 +212,17 @@ class McapLog:
         if not needed:
             return
         path = file_path(self.directory / stream, first_number)
-        with _opened(path, needed) as file:
+        with opened(path, needed) as file:
             self.read_counts.files += 1
             for chunk in needed:
                 self.read_counts.chunks += 1
-                yield from _events(_chunk_data(file, path, chunk), stream, chunk.number, channels, wanted)
+                yield from _events(chunk_data(file, path, chunk), stream, chunk.number, channels, wanted)
 
     def _channels(self, stream: str, first_number: int, chunks: Sequence[CatalogChunk]) -> dict[int, ChannelKey]:
         """The channels of a file with these chunks. Raises LogDamaged where the file is gone since they were read."""
         known = self._asked(stream, lambda catalog: catalog.channels(stream, first_number))
         if not known.keys() >= {channel_id for chunk in chunks for channel_id in chunk.channel_ids}:
-            raise _taken_away(file_path(self.directory / stream, first_number), chunks)
+            raise taken_away(file_path(self.directory / stream, first_number), chunks)
         return known
 
     def streams(self) -> tuple[str, ...]:
@@ -293,6 +302,7 @@ class McapLog:
         """All files ended with their index, all streams let go. Raises AppendFailed if that cannot be written."""
         with self._lock, ExitStack() as closing:  # each one is closed, whatever becomes of the others
             closing.callback(self._catalog.close)
+            closing.callback(self._syncing.shutdown)
             while self._writers:
                 closing.callback(self._writers.popitem()[1].close)
 
@@ -344,31 +354,6 @@ def _damages(files: Sequence[CatalogFile], number: int) -> dict[int, str]:
         for file, end in zip(files, ends, strict=False)  # no file, no end: an unknown stream holds nothing
         if file.damage and end > number
     }
-
-
-def _opened(path: Path, chunks: Sequence[CatalogChunk]) -> BinaryIO:
-    """The file, to be read. Raises LogDamaged where it is gone."""
-    try:
-        return path.open("rb")
-    except FileNotFoundError as error:
-        raise _taken_away(path, chunks) from error
-
-
-def _taken_away(path: Path, chunks: Sequence[CatalogChunk]) -> LogDamaged:
-    span = f"numbers {chunks[0].number} to {chunks[-1].number + chunks[-1].count - 1}"
-    return LogDamaged(f"{path}: {span} were taken away while the stream was read")
-
-
-def _chunk_data(file: BinaryIO, path: Path, chunk: CatalogChunk) -> bytes:
-    """The records of a chunk, checked. Raises LogDamaged."""
-    file.seek(chunk.offset)
-    record = file.read(chunk.length)
-    try:
-        if len(record) < chunk.length or FRAME.unpack_from(record) != (Opcode.CHUNK, chunk.length - FRAME.size):
-            raise LogDamaged(f"no chunk of {chunk.length} bytes")
-        return unpacked(parsed(Chunk, record[FRAME.size :]), checksum_required=True)
-    except LogDamaged as error:
-        raise LogDamaged(f"{path}, byte {chunk.offset}: {error}; {chunk.count} messages lost") from error
 
 
 def _events(

@@ -1,16 +1,17 @@
 """The event log's twin in memory: the same answers, nothing kept beyond the process."""
 
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from trigpoint.errors import TrigpointError
 from trigpoint.events.codec import Event
 from trigpoint.events.envelope import Envelope, LogPosition
 from trigpoint.events.runs import EncodedRun, LoggedRun, encoded, envelopes
 from trigpoint.logs.absences import Absence
 from trigpoint.logs.channels import packed_rows
 from trigpoint.logs.log_files import valid_stream
-from trigpoint.logs.ports import LoggedBoot, LoggedEvent
+from trigpoint.logs.ports import AppendedTogether, LoggedBoot, LoggedEvent
 
 
 class MemoryLog:
@@ -30,6 +31,16 @@ class MemoryLog:
             kept = self._streams.setdefault(stream, [])
             kept.extend(events)
             return LogPosition(stream, len(kept) - 1)
+
+    def append_all(self, rows_by_stream: Mapping[str, Sequence[Envelope[Event] | EncodedRun]]) -> AppendedTogether:
+        """Of each stream what `append` gives or raises."""
+        positions, failures = {}, {}
+        for stream, rows in rows_by_stream.items():
+            try:
+                positions[stream] = self.append(stream, rows)
+            except TrigpointError as error:
+                failures[stream] = error
+        return AppendedTogether(positions, failures)
 
     def read(
         self,

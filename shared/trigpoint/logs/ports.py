@@ -1,12 +1,13 @@
 """What a log can do, whatever keeps it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from trigpoint.errors import TrigpointError
 from trigpoint.events.codec import Event
 from trigpoint.events.envelope import Envelope, LogPosition
-from trigpoint.events.runs import EncodedRun, LoggedRun
+from trigpoint.events.runs import EncodedRun
 from trigpoint.logs.absences import Absence
 
 
@@ -28,6 +29,14 @@ class LoggedBoot:
     end_ns: int
 
 
+@dataclass(frozen=True, slots=True)
+class AppendedTogether:
+    """Of several streams the positions of their last rows, and of the others what their appends failed with."""
+
+    positions: Mapping[str, LogPosition]
+    failures: Mapping[str, TrigpointError]
+
+
 class EventLog(Protocol):
     """Append-only streams of events; one writer a stream."""
 
@@ -46,11 +55,6 @@ class EventLog(Protocol):
     ) -> Iterator[LoggedEvent]:
         """The events of a stream from `first_number` on, in order of appending; of the half-open time range
         [from_ns, until_ns) and of the given event classes only, if given: files and chunks outside stay closed."""
-
-    def read_runs(
-        self, stream: str, *, first_number: int = 0, kinds: Sequence[type] | None = None
-    ) -> Iterator[LoggedRun]:
-        """What `read` gives, many events at once and none decoded."""
 
     def streams(self) -> tuple[str, ...]:
         """The names of all streams, sorted."""
@@ -74,7 +78,10 @@ class EventLog(Protocol):
 
 
 class RecallingLog(EventLog, Protocol):
-    """An EventLog that also tells who said what when without a look at what was said."""
+    """An EventLog that also tells who said what when without a look at what was said, and takes groups of events."""
+
+    def append_all(self, rows_by_stream: Mapping[str, Sequence[Envelope[Event] | EncodedRun]]) -> AppendedTogether:
+        """Of each stream, with a row at least, what `append` gives or raises: side by side, not one by one."""
 
     def read_headers(self, stream: str) -> Iterator[EncodedRun]:
         """Identities, schemas and times of all events of a stream, in order, as runs without payloads."""

@@ -5,14 +5,22 @@ import fcntl
 import os
 import sqlite3
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from io import FileIO
 from pathlib import Path
 
 from trigpoint.errors import AppendFailed
 from trigpoint.logs.absences import recorded_absences, sync_folder
-from trigpoint.logs.catalog import Catalog, CatalogChunk, CatalogEntry, CatalogFile, CatalogRenewed, renewed_once
+from trigpoint.logs.catalog import (
+    Catalog,
+    CatalogChunk,
+    CatalogEntry,
+    CatalogFile,
+    CatalogGrowth,
+    CatalogRenewed,
+    renewed_once,
+)
 from trigpoint.logs.channels import PackedRows
 from trigpoint.logs.log_files import LOCK_NAME, bring_up_to_date, entry_of, file_path, mend
 from trigpoint.logs.mcap_writer import CHANNEL_LIMIT, McapFileWriter, WrittenChunk
@@ -46,6 +54,7 @@ class _OpenFile:
     end_ns: int
     channels_known: int = 0
     durable_bytes: int = 0  # and entered in the catalog
+    written: Sequence[WrittenChunk] = ()  # behind them
     seen_ns: int | None = None  # when its age was first asked for
 
 
@@ -78,22 +87,75 @@ class StreamWriter:
 
     def append(self, rows: PackedRows, metadata: Mapping[str, Mapping[str, str]]) -> None:
         """The rows durable. Raises AppendFailed and lets the stream go; nothing of them counts as appended then,
-        unless it was only the end of a full file that could not be written."""
-        number = self.next_number
-        try:
+        unless it was only the end of a full file that could not be written. Each step below raises the same."""
+        self.write(rows, metadata)
+        self.sync()
+        self.enter()
+        self.settle()
+
+    def write(self, rows: PackedRows, metadata: Mapping[str, Mapping[str, str]]) -> None:
+        """The rows with the operating system: the first step of an append."""
+        with self._or_let_go():
             target = self._open_file or self._begin(int(rows.stamps_ns[0]), metadata)
-            chunks = target.writer.append(rows)
-            os.fsync(target.file.fileno())
-            self._enter(target, chunks)
-            target.durable_bytes = target.writer.size_bytes
-            if self._is_long_enough(target):
+            target.written = target.writer.append(rows)
+
+    def sync(self) -> None:
+        """What was written is durable: the second step, which may be another thread's."""
+        with self._or_let_go():
+            os.fsync(self._target.file.fileno())
+
+    def growth(self) -> CatalogGrowth:
+        """What the catalog is to be told of what was written, in the third step."""
+        target, number, entered = self._target, self.next_number, []
+        for chunk in target.written:
+            place = (chunk.start_ns, chunk.end_ns, chunk.offset, chunk.length)
+            entered.append(CatalogChunk(target.first_number, number, chunk.count, *place, chunk.channel_ids))
+            number += chunk.count
+        channels = [(number, key) for key, number in target.writer.channels.items() if number > target.channels_known]
+        state = self._state(target, finished=False)
+        return CatalogGrowth(CatalogEntry(state, tuple(entered), tuple(channels)), target.durable_bytes)
+
+    def enter(self) -> None:
+        """What was written is in the catalog: the third step, where it is not taken for several streams as one."""
+        with self._or_let_go():
+            self._add(self.growth())
+
+    def settle(self) -> None:
+        """What was written counts as appended, and a file that is long enough is ended: the last step."""
+        target = self._target
+        for chunk in target.written:
+            self.next_number += chunk.count
+            target.start_ns = min(target.start_ns, chunk.start_ns)
+            target.end_ns = max(target.end_ns, chunk.end_ns)
+        target.written = ()
+        target.channels_known = len(target.writer.channels)
+        target.durable_bytes = target.writer.size_bytes
+        if self._is_long_enough(target):
+            with self._or_let_go():
                 self._end(target)
+
+    @property
+    def _target(self) -> _OpenFile:
+        if self._open_file is None:
+            raise AppendFailed(f"stream {self._folder.name}: nothing was written")
+        return self._open_file
+
+    @contextlib.contextmanager
+    def _or_let_go(self) -> Iterator[None]:
+        try:
+            yield
         except (OSError, sqlite3.Error) as error:
-            self._abandon()
-            raise AppendFailed(f"stream {self._folder.name}, number {number}: {error}") from error
+            raise self.refused(error) from error
         except BaseException:
-            self._abandon()
+            self.let_go()
             raise
+
+    def refused(self, error: Exception) -> AppendFailed:
+        """What is to be raised for an append that came to this; the stream is let go."""
+        self.let_go()
+        failed = AppendFailed(f"stream {self._folder.name}, number {self.next_number}: {error}")
+        failed.__cause__ = error
+        return failed
 
     def end_aged(self, now_ns: int) -> bool:
         """Whether the file was ended, because it was open for the rotation's age; its age counts from the first look.
@@ -110,7 +172,7 @@ class StreamWriter:
         try:
             self._end(target)
         except (OSError, sqlite3.Error) as error:
-            self._abandon()
+            self.let_go()
             raise AppendFailed(f"stream {self._folder.name}: file not ended: {error}") from error
         return True
 
@@ -120,7 +182,7 @@ class StreamWriter:
             if self._open_file:
                 self._end(self._open_file)
         except (OSError, sqlite3.Error) as error:
-            self._abandon()
+            self.let_go()
             raise AppendFailed(f"stream {self._folder.name}: last file not ended: {error}") from error
         self._lock.close()
 
@@ -134,26 +196,12 @@ class StreamWriter:
         sync_folder(self._folder.parent)
         return self._open_file
 
-    def _enter(self, target: _OpenFile, chunks: Sequence[WrittenChunk]) -> None:
-        """What is durable now entered in the catalog and counted."""
-        entered = []
-        for chunk in chunks:
-            place = (chunk.start_ns, chunk.end_ns, chunk.offset, chunk.length)
-            entered.append(CatalogChunk(target.first_number, self.next_number, chunk.count, *place, chunk.channel_ids))
-            self.next_number += chunk.count
-            target.start_ns = min(target.start_ns, chunk.start_ns)
-            target.end_ns = max(target.end_ns, chunk.end_ns)
-        channels = [(number, key) for key, number in target.writer.channels.items() if number > target.channels_known]
-        target.channels_known = len(target.writer.channels)
-        state = self._state(target, finished=False)
-        self._add(CatalogEntry(state, tuple(entered), tuple(channels)), target)
-
-    def _add(self, entry: CatalogEntry, target: _OpenFile) -> None:
-        """The entry in the catalog; if that was begun anew, everything the file holds."""
+    def _add(self, growth: CatalogGrowth) -> None:
+        """The growth in the catalog; if that was begun anew, everything the file holds."""
         try:
-            self._catalog.add(entry, known_bytes=target.durable_bytes)
+            self._catalog.add_all([growth])
         except CatalogRenewed:
-            whole = entry_of(self._folder, self._folder.name, target.first_number)
+            whole = entry_of(self._folder, self._folder.name, growth.entry.file.first_number)
             renewed_once(lambda: self._catalog.replace(whole))
 
     def _state(self, target: _OpenFile, *, finished: bool) -> CatalogFile:
@@ -169,9 +217,15 @@ class StreamWriter:
         os.fsync(target.file.fileno())
         target.file.close()
         self._open_file = None
-        self._add(CatalogEntry(self._state(target, finished=True), (), ()), target)
+        ended = CatalogEntry(self._state(target, finished=True), (), ())
+        self._add(CatalogGrowth(ended, target.durable_bytes))
 
-    def _abandon(self) -> None:
+    @property
+    def is_let_go(self) -> bool:
+        """Whether nothing can be appended by this writer any more."""
+        return self._lock.closed
+
+    def let_go(self) -> None:
         """After a failure: what is not durable cut off, as far as the disk lets us, and the stream let go."""
         target, self._open_file = self._open_file, None
         if target and not target.file.closed:

@@ -1,5 +1,7 @@
 """The attachment's bytes."""
 
+from random import Random
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -10,6 +12,7 @@ from trigpoint.bus.attachment import (
     decode_bundle,
     encode_attachment,
     encode_bundle,
+    uniform_bundle,
 )
 from trigpoint.errors import InputError
 from trigpoint.events.envelope import EventIdentity
@@ -75,3 +78,27 @@ def test_a_truncated_bundle_is_refused(cut: int) -> None:
     _, payload = encode_bundle([(b"abc", b"defg"), (b"h", b"i")])
     with pytest.raises(InputError, match="ends inside"):
         decode_bundle(payload[:-cut])
+
+
+@given(lengths=st.tuples(st.integers(0, 20), st.integers(0, 20)), count=st.integers(1, 9), die=st.randoms())
+def test_a_bundle_of_messages_of_one_length_is_taken_apart_at_once(
+    lengths: tuple[int, int], count: int, die: Random
+) -> None:
+    parts = [(die.randbytes(lengths[0]), die.randbytes(lengths[1])) for _ in range(count)]
+    found = uniform_bundle(encode_bundle(parts)[1])
+    assert found is not None
+    assert list(zip(map(bytes, found[0]), found[1], strict=True)) == parts
+
+
+@given(parts=st.lists(st.tuples(st.binary(max_size=9), st.binary(max_size=9)), min_size=1))
+def test_what_is_taken_apart_at_once_is_what_one_message_after_another_gives(
+    parts: list[tuple[bytes, bytes]],
+) -> None:
+    found = uniform_bundle(encode_bundle(parts)[1])
+    assert (found is not None) == (len({tuple(map(len, part)) for part in parts}) == 1)
+
+
+@given(payload=st.binary(max_size=80))
+def test_any_bytes_are_a_bundle_of_one_length_or_none(payload: bytes) -> None:
+    found = uniform_bundle(payload)
+    assert found is None or len(found[0]) == len(found[1]) > 0
