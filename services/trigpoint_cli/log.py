@@ -97,9 +97,11 @@ def verify_command(path: Path, *, screen: Screen) -> Answer:
             }
             for stream, absence in found.absences
         ],
+        "written_streams": list(found.written_streams),
     }
     lines = (
         f"{count} events in {len(found.files)} files, {len(found.findings)} findings",
+        *(f"{stream}: being written, its last file has no end yet" for stream in found.written_streams),
         *(
             f"{stream}: numbers {absence.first_number} to {absence.stop_number - 1}: {absence.reason.value}"
             for stream, absence in found.absences

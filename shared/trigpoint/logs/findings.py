@@ -7,7 +7,7 @@ from pathlib import Path
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Something wrong with a file. `kind` is one of "damaged", "unfinished" (its writer died, or still writes),
+    """Something wrong with a file. `kind` is one of "damaged", "unfinished" (its writer died),
     "number gap", "repeated identity", "unknown channel", "broken seal", "missing file", "wrong catalog";
     `lost_messages` -1 where it cannot be told."""
 

@@ -7,7 +7,7 @@ from typing import Protocol
 from trigpoint.errors import TrigpointError
 from trigpoint.events.codec import Event
 from trigpoint.events.envelope import Envelope, LogPosition
-from trigpoint.events.runs import EncodedRun
+from trigpoint.events.runs import EncodedRun, LoggedRun
 from trigpoint.logs.absences import Absence
 
 
@@ -55,6 +55,11 @@ class EventLog(Protocol):
     ) -> Iterator[LoggedEvent]:
         """The events of a stream from `first_number` on, in order of appending; of the half-open time range
         [from_ns, until_ns) and of the given event classes only, if given: files and chunks outside stay closed."""
+
+    def read_runs(
+        self, stream: str, *, first_number: int = 0, kinds: Sequence[type] | None = None
+    ) -> Iterator[LoggedRun]:
+        """What `read` gives, many events at once and none decoded."""
 
     def streams(self) -> tuple[str, ...]:
         """The names of all streams, sorted."""

@@ -8,11 +8,11 @@ from trigpoint.errors import InputError, LogDamaged
 from trigpoint.events.seen import SeenSequences
 from trigpoint.logs.absences import NAME as ABSENCES_NAME
 from trigpoint.logs.absences import Absence, recorded_absences, uncovered
-from trigpoint.logs.catalog_verification import catalog_findings
+from trigpoint.logs.catalog_verification import catalog_findings, known_files
 from trigpoint.logs.channels import ChannelKey
 from trigpoint.logs.chunks import ChunkMessage, messages
 from trigpoint.logs.findings import FileSummary, Finding, TopicSummary
-from trigpoint.logs.log_files import SUFFIX, file_numbers, file_path
+from trigpoint.logs.log_files import SUFFIX, file_numbers, file_path, has_writer
 from trigpoint.logs.mcap_scan import UNKNOWN, McapScan
 from trigpoint.logs.seals import is_sealed, orphan_seals, seal_fault
 
@@ -32,12 +32,14 @@ class BootSummary:
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """The files looked at and all that is wrong with them; nothing is if `findings` is empty."""
+    """The files looked at and all that is wrong with them; nothing is if `findings` is empty. Of the streams being
+    written the last file has no end yet, which is nothing wrong."""
 
     files: tuple[FileSummary, ...]
     boots: tuple[BootSummary, ...]
     findings: tuple[Finding, ...]
     absences: tuple[tuple[str, Absence], ...] = ()  # by stream, what is recorded as gone: nothing wrong
+    written_streams: tuple[str, ...] = ()
 
 
 @dataclass(slots=True)
@@ -69,12 +71,13 @@ class _Verifier:
         self.findings: list[Finding] = []
         self.absences: list[tuple[str, Absence]] = []
 
-    def file(self, path: Path, stream: str) -> FileSummary:
+    def file(self, path: Path, stream: str, *, being_written: bool = False) -> FileSummary:
         scan, tally = McapScan(path), _Tally()
         for chunk in scan.chunks():
             for message in messages(chunk.data):
                 self._message(scan, chunk.offset, message, tally)
-        self._damages(scan)
+        if not (being_written and scan.torn_tail):
+            self._damages(scan)
         topics = tally.topics(scan.channels)
         return FileSummary(
             path=path,
@@ -161,16 +164,31 @@ def verify(path: Path) -> Verification:
 
     Raises InputError if there is no log at all.
     """
-    verifier, files = _Verifier(), []
+    verifier, files, known = _Verifier(), [], known_files(path)
+    written: list[str] = []
     for folder, numbered in _folders(path):
-        summaries = [verifier.file(file, folder.name if numbered else file.stem) for file in _files(path, folder)]
+        if numbered and has_writer(folder):
+            written.append(folder.name)
+        summaries = _summaries(verifier, path, folder, numbered=numbered, being_written=folder.name in written)
         if numbered:
             verifier.stream(folder, summaries)
         files += summaries
-    verifier.findings += catalog_findings(path, files, verifier.absences)
+    verifier.findings += catalog_findings(path, known, files, verifier.absences)
     if not files and not verifier.absences:
         raise InputError(f"{path}: no {SUFFIX} file there")
-    return Verification(tuple(files), verifier.boots(), tuple(verifier.findings), tuple(verifier.absences))
+    found, absences = tuple(verifier.findings), tuple(verifier.absences)
+    return Verification(tuple(files), verifier.boots(), found, absences, tuple(written))
+
+
+def _summaries(
+    verifier: _Verifier, path: Path, folder: Path, *, numbered: bool, being_written: bool
+) -> list[FileSummary]:
+    """The files of a folder; of a stream that is being written, the last one may lack its end."""
+    paths = _files(path, folder)
+    return [
+        verifier.file(one, folder.name if numbered else one.stem, being_written=being_written and one == paths[-1])
+        for one in paths
+    ]
 
 
 def _folders(path: Path) -> list[tuple[Path, bool]]:

@@ -1,6 +1,7 @@
 """`trigpoint log seal|retain|recover|verify` on a log of known events."""
 
 import json
+import shutil
 from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
@@ -54,6 +55,22 @@ def test_a_stream_being_written_keeps_its_last_file(data: Path) -> None:
         log.append(STREAM, imu_rows(480, 490))
         said = trigpoint("log", "seal", data, "--json").answer
     assert (len(said["sealed"]), said["written_streams"]) == (5, [STREAM])
+
+
+def test_a_log_being_written_is_whole_and_its_open_streams_are_named(data: Path) -> None:
+    with closing(McapLog(data / "log")) as log:
+        log.append(STREAM, imu_rows(480, 490))
+        said = trigpoint("log", "verify", data, "--json")
+    assert (said.status, said.answer["written_streams"]) == (0, [STREAM])
+    assert trigpoint("log", "verify", data, "--json").answer["written_streams"] == []
+
+
+def test_a_file_that_its_writer_left_open_is_unfinished(data: Path, tmp_path: Path) -> None:
+    with closing(McapLog(data / "log")) as log:
+        log.append(STREAM, imu_rows(480, 490))
+        left = shutil.copytree(data, tmp_path / "left")
+    said = trigpoint("log", "verify", left, "--json")
+    assert (said.status, [one["kind"] for one in said.answer["findings"]]) == (2, ["unfinished"])
 
 
 def test_a_damaged_file_is_not_sealed_and_said_with_status_2(data: Path) -> None:

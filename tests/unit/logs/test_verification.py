@@ -1,3 +1,4 @@
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,7 @@ from event_examples.one_each import ONE_OF_EACH
 from event_examples.rows import START_NS, STEP_NS, fix_row, imu_row, imu_rows
 from trigpoint.errors import InputError
 from trigpoint.events.corrected import AnchorLabelled
+from trigpoint.logs.catalog_verification import catalog_findings, known_files
 from trigpoint.logs.findings import TopicSummary
 from trigpoint.logs.mcap_log import McapLog
 from trigpoint.logs.stream_writer import Rotation
@@ -51,6 +53,15 @@ def test_files_and_boots_are_summed_up(directory: Path) -> None:
     verification = verify(directory)
     assert [file.count for file in verification.files] == [10, 10, 10]
     assert [(boot.source, boot.count, boot.missing) for boot in verification.boots] == [("van", 30, 0)]
+
+
+def test_what_a_writer_adds_after_the_catalog_was_looked_at_is_nothing_wrong(directory: Path) -> None:
+    with closing(McapLog(directory)) as log:
+        known = known_files(directory)
+        log.append(STREAM, imu_rows(30, 40))
+        files = verify(directory).files
+        assert sum(file.count for file in files) == 40
+        assert catalog_findings(directory, known, files, ()) == ()
 
 
 def test_topics_tell_counts_and_times(tmp_path: Path) -> None:

@@ -150,7 +150,8 @@ def test_what_is_not_taken_in_yet_and_what_becoming_durable_takes_is_measured() 
         assert all([service.step(), service.step()])
     shown = instruments.registry.get_sample_value
     assert shown("trigpoint_projection_lag_events") == len(rows) - 2 * BATCH
-    assert (shown("trigpoint_projection_lag_seconds"), shown("trigpoint_fsync_seconds_count")) > (0.0, 0.0)
+    assert shown("trigpoint_projection_lag_seconds") != 0.0
+    assert shown("trigpoint_fsync_seconds_count") != 0.0
 
 
 def test_a_drive_with_fixes_becomes_a_map_within_what_fixes_hold() -> None:
