@@ -106,10 +106,10 @@ class Reception:
         drive = (run.source, run.boot_id)
         if not len(run):
             return
-        if not run.source or int(run.sequences.min()) < 0:
-            self._take_aside(run)
-        elif run.source != sender:
+        if run.source and run.source != sender:
             self._refuse_impostor(sender, run)
+        elif not run.source or int(run.sequences.min()) < 0:
+            self._take_aside(run)
         elif self._journal.admission.has_room_for(drive):
             self._arrived.setdefault(drive, []).append(run)
             self._arrived_count += len(run)

@@ -76,6 +76,17 @@ def test_a_vehicle_that_sends_as_another_is_refused_counted_and_changes_nothing_
     assert instruments.registry.get_sample_value("trigpoint_refused_access_total") == 1.0
 
 
+def test_a_message_without_a_number_in_anothers_name_counts_as_nobodys(rows: Rows, bus: MemoryBus) -> None:
+    log, instruments = MemoryLog(), Instruments("ingest")
+    unnumbered = replace(rows[5], identity=replace(rows[5].identity, sequence=-1))
+    with IngestService(log, bus, SETTINGS, instruments=instruments) as service:
+        bus.publish(live(unnumbered, key_of="veh-b"))
+        drain(service)
+    assert refusals(log) == ["wrong sender"]
+    labels = {"vehicle": "", "reason": "wrong sender"}
+    assert instruments.registry.get_sample_value("trigpoint_rejected_total", labels) == 1.0
+
+
 def test_what_is_beyond_a_vehicles_rate_is_neither_taken_nor_acknowledged_until_it_comes_again(
     rows: Rows, bus: MemoryBus
 ) -> None:
