@@ -4,6 +4,7 @@ import os
 import pwd
 from dataclasses import dataclass, field
 
+from trigpoint.configuration.limits import Count, Positive, Seconds
 from trigpoint.events.keys import DEFAULT_MAP, DEFAULT_ROOT
 from trigpoint_ingest.core.stamps import StampLimits
 
@@ -29,22 +30,22 @@ class IngestSettings:
     fleet: frozenset[str] | None = None
     vehicles: tuple[str, ...] = ()
     stamps: StampLimits = field(default_factory=StampLimits)
-    batch_count: int = 4096
-    live_batch_count: int = 256
-    batch_bytes: int = 4 * 1024 * 1024
+    batch_count: Count = 4096
+    live_batch_count: Count = 256
+    batch_bytes: Count = 4 * 1024 * 1024
     batch_s: float = 0.1
-    pending_count: int = 65_536
-    pending_bytes: int = 32 * 1024 * 1024
-    gap_timeout_s: float = 30.0
+    pending_count: Count = 65_536
+    pending_bytes: Count = 32 * 1024 * 1024
+    gap_timeout_s: Seconds = 30.0
     held_limit: int = 16_384
     refused_payload_limit: int = 65_536
-    message_limit_bytes: int = 4 * 1024 * 1024
-    vehicle_rate_hz: float = 50_000.0
-    vehicle_burst: int = 100_000
-    drive_limit: int = 100_000
-    name_limit: int = 10_000
-    disk_retry_s: float = 0.5
-    slow_append_s: float = 5.0
+    message_limit_bytes: Count = 4 * 1024 * 1024
+    vehicle_rate_hz: Positive = 50_000.0
+    vehicle_burst: Count = 100_000
+    drive_limit: Count = 100_000
+    name_limit: Count = 10_000
+    disk_retry_s: Seconds = 0.5
+    slow_append_s: Seconds = 5.0
     claim_settle_s: float = 0.5
 
 

@@ -9,6 +9,8 @@ from trigpoint.errors import InputError
 
 OTHERS = 0o007  # permission bits of everyone but the owner and the group
 LOOPBACK_NAME = "localhost"
+OVER_IP = ("tcp", "tls", "udp", "quic", "ws")  # protocols of endpoints that are a host and a port
+PORT_LAST = 65_535
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,10 +53,11 @@ def tls_values(files: TlsFiles) -> Iterator[tuple[str, object]]:
 def checked_endpoints(listen: Sequence[str], connect: Sequence[str], files: TlsFiles | None) -> None:
     """Nothing, if the endpoints go with the files.
 
-    Raises InputError for `tls/` without files, for anything else with them, and for an unprotected endpoint that
-    listens beyond this machine.
+    Raises InputError for what is no endpoint, for `tls/` without files, for anything else with them, and for an
+    unprotected endpoint that listens beyond this machine.
     """
     for endpoint in (*listen, *connect):
+        _require_form(endpoint)
         protocol = endpoint.partition("/")[0]
         if protocol == "tls" and files is None:
             raise InputError(f"endpoint {endpoint!r}: needs authority_file, certificate_file and key_file under tls")
@@ -66,12 +69,25 @@ def checked_endpoints(listen: Sequence[str], connect: Sequence[str], files: TlsF
                 raise InputError(f"endpoint {endpoint!r}: beyond this machine only 'tls/' may listen")
 
 
+def _require_form(endpoint: str) -> None:
+    protocol, _, rest = endpoint.partition("/")
+    host, port = _host_and_port(rest)
+    is_address = bool(host) and port.isdecimal() and int(port) <= PORT_LAST
+    if not protocol or not rest or (protocol in OVER_IP and not is_address):
+        raise InputError(f"endpoint {endpoint!r}: PROTOCOL/HOST:PORT is needed, as in tcp/127.0.0.1:7447")
+
+
+def _host_and_port(rest: str) -> tuple[str, str]:
+    host, _, port = rest.partition("#")[0].partition("?")[0].rpartition(":")
+    return host, port
+
+
 def is_local(endpoint: str) -> bool:
     """Whether an endpoint is reached from this machine only: a loopback address, or no address of a network."""
     protocol, _, rest = endpoint.partition("/")
     if protocol.startswith("unix"):
         return True
-    host = rest.partition("#")[0].partition("?")[0].rpartition(":")[0].strip("[]")
+    host = _host_and_port(rest)[0].strip("[]")
     try:
         return ip_address(host).is_loopback
     except ValueError:

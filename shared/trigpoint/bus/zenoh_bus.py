@@ -17,7 +17,7 @@ from trigpoint.bus.inbox import INBOX_BYTES, INBOX_CAPACITY, Inbox
 from trigpoint.bus.key_expressions import checked_expression, checked_key
 from trigpoint.bus.ports import BusMessage, BusRun
 from trigpoint.bus.tls import TlsFiles, checked_endpoints, tls_values
-from trigpoint.errors import ServiceError
+from trigpoint.errors import InputError, ServiceError
 
 PROTOBUF = "application/protobuf"
 BUNDLE_COUNT = 256  # messages in a transmission: some 15 kB of IMU, below the 64 kB a Zenoh batch holds
@@ -31,7 +31,8 @@ class ZenohSettings:
     """A session's endpoints such as "tcp/127.0.0.1:7447"; scouting finds peers without endpoints, by multicast.
 
     A client waits `connect_timeout_s` for its first connection; a later one comes back by itself. With `tls` both ends
-    of every link show certificates. Raises InputError where endpoints and `tls` do not go together.
+    of every link show certificates. Raises InputError where endpoints and `tls` do not go together, and for
+    limits that let nothing through.
     """
 
     listen: tuple[str, ...] = ()
@@ -46,6 +47,9 @@ class ZenohSettings:
 
     def __post_init__(self) -> None:
         checked_endpoints(self.listen, self.connect, self.tls)
+        for name in ("inbox_capacity", "inbox_bytes", "message_limit_bytes"):
+            if getattr(self, name) < 1:
+                raise InputError(f"{name} {getattr(self, name)}: at least 1 is needed")
 
 
 def session_config(settings: ZenohSettings) -> zenoh.Config:

@@ -26,6 +26,18 @@ def test_what_is_reached_from_this_machine_only_may_listen(endpoint: str) -> Non
     assert ZenohSettings(listen=(endpoint,)).listen == (endpoint,)
 
 
+@pytest.mark.parametrize("endpoint", ["rubbish", "tcp", "tcp/", "tcp/host", "tcp/host:", "tcp/:7447", "tcp/host:65536"])
+def test_what_is_no_endpoint_is_refused(endpoint: str) -> None:
+    with pytest.raises(InputError, match="PROTOCOL/HOST:PORT"):
+        ZenohSettings(connect=(endpoint,))
+
+
+@pytest.mark.parametrize("name", ["inbox_capacity", "inbox_bytes", "message_limit_bytes"])
+def test_limits_that_let_nothing_through_are_refused(name: str) -> None:
+    with pytest.raises(InputError, match=f"{name} 0: at least 1"):
+        ZenohSettings(**{name: 0})  # type: ignore[arg-type]
+
+
 def test_protected_endpoints_need_certificates_and_certificates_protected_endpoints() -> None:
     with pytest.raises(InputError, match="authority_file"):
         ZenohSettings(connect=("tls/router:7447",))

@@ -41,6 +41,10 @@ def test_a_configuration_that_is_wrong_ends_with_status_2_and_every_complaint() 
     ("flags", "complaint"),
     [
         (("http.up_port=9462",), "[http] up_port = 9462: ingest_port has the same"),
+        (("ingest.pending_count=0",), "[ingest] pending_count = '0': should be greater than or equal to 1"),
+        (("ingest.vehicle_rate_hz=0",), "[ingest] vehicle_rate_hz = '0': should be greater than 0"),
+        (("bus.inbox_capacity=0",), "[bus] inbox_capacity 0: at least 1 is needed"),
+        (("bus.connect=router",), "[bus] endpoint 'router': PROTOCOL/HOST:PORT is needed"),
         (("database.url=mysql://h/d",), "[database] url 'mysql': begins with geopackage: or postgresql+psycopg:"),
         (("tracing.endpoint=localhost:4318",), "[tracing] endpoint 'localhost:4318': begins with http://"),
         (("fleet.root=a/b",), "[fleet] name 'a/b' holds /"),
