@@ -80,6 +80,9 @@ def run(words: Sequence[str]) -> int:
     try:
         trigpoint.main(args=list(words), prog_name="trigpoint", standalone_mode=False)
         return OK
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message(), err=True)
+        return BAD_INPUT
     except Exception as error:
         if "--debug" in words:
             logging.getLogger(__name__).error("traceback of the error", exc_info=True)

@@ -23,6 +23,7 @@ from trigpoint_vehicle.recorded_drive import Driven, RecordedDrive, VehicleLogs,
 from trigpoint_vehicle.settings import VehicleSettings
 from trigpoint_vehicle.spool import Behind
 
+GIVE_UP = click.FloatRange(min=0.0, min_open=True)
 LOOK_S = 0.2  # between two looks whether the drives are over
 
 
@@ -66,7 +67,9 @@ def command() -> None:
 @click.argument("logs", nargs=-1, required=True, metavar="LOG...", type=click.Path(path_type=Path))
 @click.option("--speed", type=float, default=1.0, show_default=True, metavar="X", help="0: as fast as it goes.")
 @click.option("--spool", type=click.Path(path_type=Path), metavar="DIR", help="Kept; else a temporary one.")
-@click.option("--give-up-after-s", type=float, default=60.0, show_default=True, metavar="S", help="Unacknowledged.")
+@click.option(
+    "--give-up-after-s", type=GIVE_UP, default=60.0, show_default=True, metavar="S", help="Without an acknowledgement."
+)
 @answering
 @link_options
 def replay(

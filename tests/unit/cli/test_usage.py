@@ -75,6 +75,20 @@ def test_bad_usage_ends_with_status_2_and_says_why(words: tuple[str, ...]) -> No
     assert words[-1] in said.err or "Missing option" in said.err
 
 
+@pytest.mark.parametrize("group", ["certs", "config", "drives", "log", "vehicle"])
+def test_a_group_without_a_command_lists_its_commands_line_by_line(group: str) -> None:
+    said = trigpoint(group)
+    assert said.status == 2
+    assert "\nCommands:\n" in said.err
+
+
+def test_a_replay_that_would_give_up_at_once_is_refused_with_the_limit() -> None:
+    words = ("vehicle", "replay", "a.mcap", "--connect", "tcp/127.0.0.1:1", "--give-up-after-s", "-5", "--json")
+    said = trigpoint(*words)
+    assert said.status == 2
+    assert "-5" in said.answer["error"]
+
+
 @pytest.mark.parametrize(("option", "value"), [("--seed", "-1"), ("--vehicles", "0"), ("--vehicles", "51")])
 def test_a_campus_that_cannot_be_is_refused_with_the_limits(option: str, value: str, tmp_path: Path) -> None:
     said = trigpoint("demo", "--out", tmp_path / "demo", option, value, "--json")
