@@ -8,7 +8,7 @@ is the file's first number plus the messages before it.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import groupby
 
@@ -80,6 +80,8 @@ def packed_rows(rows: Sequence[Envelope[Event] | EncodedRun]) -> PackedRows:
             parts += [_run_rows(run, number_of) for run in group if isinstance(run, EncodedRun)]
         else:
             parts.append(_table([_row(row) for row in group if isinstance(row, Envelope)], number_of))
+    if len(parts) == 1:
+        return replace(parts[0], channels=tuple(number_of))
     return PackedRows(
         tuple(number_of),
         np.concatenate([part.channel_of_row for part in parts]),
@@ -105,6 +107,10 @@ def _run_rows(run: EncodedRun, number_of: dict[ChannelKey, int]) -> PackedRows:
     mcap_sequences = run.sequences % SEQUENCE_SPAN
     bases = run.sequences - mcap_sequences
     channel_of_row = np.zeros(len(run), dtype=np.int64)
+    if len(run) and len(run.schemas) == 1 and bases.min() == bases.max():
+        channel = _drive_channel(run.schemas[0], run.source, run.boot_id, int(bases[0]))
+        channel_of_row += number_of.setdefault(channel, len(number_of))
+        return PackedRows((), channel_of_row, mcap_sequences, run.stamps_ns, run.payloads)
     for schema, base in dict.fromkeys(zip(run.schema_of_row.tolist(), bases.tolist(), strict=True)):
         channel = _drive_channel(run.schemas[schema], run.source, run.boot_id, base)
         number = number_of.setdefault(channel, len(number_of))

@@ -236,6 +236,9 @@ class McapFileWriter:
 
 def _groups_of_rows(rows: PackedRows) -> Iterator[PackedRows]:
     """The rows cut into runs of about CHUNK_BYTES of payload."""
+    if 0 < sum(map(len, rows.payloads)) < CHUNK_BYTES:
+        yield rows
+        return
     start, size = 0, 0
     for index, payload in enumerate(rows.payloads):
         size += len(payload)
