@@ -5,6 +5,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from trigpoint.durable_files import sync_folder
 from trigpoint.errors import AppendFailed
 
 SUFFIX = ".spool"
@@ -42,15 +43,6 @@ def segment_paths(folder: Path) -> list[tuple[int, Path]]:
     """The segments there are, oldest first."""
     found = [(int(path.stem), path) for path in folder.glob(f"*{SUFFIX}") if path.stem.isdigit()]
     return sorted(found)
-
-
-def sync_folder(folder: Path) -> None:
-    """What files the folder holds is durable. Raises OSError."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def replace_segment(path: Path, data: bytes) -> None:

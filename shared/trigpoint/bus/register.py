@@ -4,12 +4,12 @@ A JSON file without secrets; the router reads it to know who may do what.
 """
 
 import json
-import os
 from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Self
 
+from trigpoint.durable_files import replace_durably
 from trigpoint.errors import InputError
 from trigpoint.events.keys import valid_name
 
@@ -98,11 +98,6 @@ def read_register(path: Path) -> Register:
 
 
 def write_register(path: Path, register: Register) -> None:
-    """The file replaced whole, so that a reader sees the old register or the new one."""
+    """The file replaced whole, so that a reader sees the old register or the new one, also after a loss of power."""
     values = {"layout": LAYOUT, "certificates": [asdict(row) for row in register.rows]}
-    fresh = path.with_suffix(".new")
-    with fresh.open("w", encoding="utf-8") as file:
-        file.write(json.dumps(values, indent=1) + "\n")
-        file.flush()
-        os.fsync(file.fileno())
-    fresh.replace(path)
+    replace_durably(path, (json.dumps(values, indent=1) + "\n").encode())

@@ -7,7 +7,6 @@ cryptography's one home.
 
 import datetime
 import fcntl
-import os
 import secrets
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -28,6 +27,7 @@ from cryptography.hazmat.primitives.serialization import (
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from trigpoint.bus.register import REGISTER_NAME, Register, Registration, Role, read_register, write_register
+from trigpoint.durable_files import replace_durably
 from trigpoint.errors import InputError
 from trigpoint.events.keys import valid_name
 
@@ -107,7 +107,7 @@ class Authority:
         issued.mkdir(mode=0o700, exist_ok=True)
         files = issued / f"{common_name}.pem", issued / f"{common_name}.key"
         _write_key(files[1], key, NoEncryption())  # Zenoh reads no encrypted ones
-        _write(files[0], certificate.public_bytes(Encoding.PEM), mode=0o644)
+        replace_durably(files[0], certificate.public_bytes(Encoding.PEM), mode=0o644)
         return files
 
     def revoke(self, name: str) -> Register:
@@ -177,7 +177,7 @@ def make_authority(folder: Path, *, name: str, now_s: int, passphrase: bytes | N
         .sign(key, None)
     )
     _write_key(folder / KEY_NAME, key, NoEncryption() if passphrase is None else BestAvailableEncryption(passphrase))
-    _write(public / CERTIFICATE_NAME, certificate.public_bytes(Encoding.PEM), mode=0o644)
+    replace_durably(public / CERTIFICATE_NAME, certificate.public_bytes(Encoding.PEM), mode=0o644)
     write_register(public / REGISTER_NAME, Register())
     return Authority(folder)
 
@@ -223,16 +223,4 @@ def _general_name(text: str) -> x509.GeneralName:
 
 
 def _write_key(path: Path, key: Ed25519PrivateKey, encryption: KeySerializationEncryption) -> None:
-    _write(path, key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, encryption), mode=OWNER_ONLY)
-
-
-def _write(path: Path, content: bytes, *, mode: int) -> None:
-    """The file replaced whole; it never has wider permissions than `mode`."""
-    fresh = path.with_name(f"{path.name}.new")
-    fresh.unlink(missing_ok=True)
-    handle = os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
-    with os.fdopen(handle, "wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    fresh.replace(path)
+    replace_durably(path, key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, encryption), mode=OWNER_ONLY)

@@ -1,7 +1,6 @@
 """What a stream does not hold any more, and why: ranges of numbers retained away or lost, recorded beside its files."""
 
 import json
-import os
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -9,6 +8,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
+from trigpoint.durable_files import replace_durably
 from trigpoint.errors import LogDamaged
 
 NAME = "absences.jsonl"  # in a stream's folder, one range a line, each with its checksum
@@ -69,25 +69,6 @@ def record_absences(folder: Path, added: Iterable[Absence]) -> None:
     """More absences recorded, durably: all of them or none. Raises LogDamaged as reading does, OSError."""
     kept = (*recorded_absences(folder), *added)
     replace_durably(folder / NAME, b"".join(_line(absence) for absence in kept))
-
-
-def replace_durably(path: Path, content: bytes) -> None:
-    """The file holds this, whole and on the disk, or what it held before. Raises OSError."""
-    partial = path.with_name(f"{path.name}.{os.getpid()}.part")  # another process may be at the same
-    with partial.open("wb", buffering=0) as file:
-        file.write(content)
-        os.fsync(file.fileno())
-    partial.replace(path)
-    sync_folder(path.parent)
-
-
-def sync_folder(folder: Path) -> None:
-    """The names in a folder durable. Raises OSError."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def uncovered(ranges: Sequence[tuple[int, int]], absences: Sequence[Absence]) -> tuple[tuple[int, int], ...]:

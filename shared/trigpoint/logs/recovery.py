@@ -7,6 +7,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from trigpoint.durable_files import sync_folder
 from trigpoint.errors import InputError, LogDamaged, ServiceError
 from trigpoint.events.seen import SeenSequences
 from trigpoint.logs.absences import NAME as ABSENCES_NAME
@@ -15,7 +16,6 @@ from trigpoint.logs.absences import (
     Reason,
     record_absences,
     recorded_absences,
-    sync_folder,
     uncovered,
 )
 from trigpoint.logs.catalog import NAME as CATALOG_NAME

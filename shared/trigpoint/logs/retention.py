@@ -6,13 +6,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from trigpoint.durable_files import sync_folder
 from trigpoint.errors import InputError, LogDamaged
 from trigpoint.events.corrected import AnchorLabelled
 from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.mapped import MapSolved
 from trigpoint.events.observed import MapFramePinned
 from trigpoint.events.seen import SeenSequences
-from trigpoint.logs.absences import Absence, BootRanges, Reason, record_absences, recorded_absences, sync_folder
+from trigpoint.logs.absences import Absence, BootRanges, Reason, record_absences, recorded_absences
 from trigpoint.logs.catalog import FileContents
 from trigpoint.logs.chunks import messages
 from trigpoint.logs.log_files import file_path

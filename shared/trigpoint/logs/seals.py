@@ -4,8 +4,8 @@ import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
+from trigpoint.durable_files import replace_durably
 from trigpoint.errors import LogDamaged
-from trigpoint.logs.absences import replace_durably
 from trigpoint.logs.file_bytes import FileBytes
 from trigpoint.logs.log_files import file_numbers, file_path
 from trigpoint.logs.mcap_scan import McapScan
