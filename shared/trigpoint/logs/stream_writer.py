@@ -53,6 +53,7 @@ class _OpenFile:
     writer: McapFileWriter
     start_ns: int
     end_ns: int
+    is_listed: bool = False  # whether its folder is known to hold it after a loss of power
     channels_known: int = 0
     durable_bytes: int = 0  # and entered in the catalog
     written: Sequence[WrittenChunk] = ()  # behind them
@@ -104,6 +105,10 @@ class StreamWriter:
         """What was written is durable: the second step, which may be another thread's."""
         with self._or_let_go():
             os.fsync(self._target.file.fileno())
+            if not self._target.is_listed:
+                sync_folder(self._folder)
+                sync_folder(self._folder.parent)
+                self._target.is_listed = True
 
     def growth(self) -> CatalogGrowth:
         """What the catalog is to be told of what was written, in the third step."""
@@ -193,8 +198,6 @@ class StreamWriter:
         self._open_file = _OpenFile(self.next_number, file, writer, stamp_ns, stamp_ns)
         begun = CatalogFile(self._folder.name, self.next_number, 0, finished=False)
         renewed_once(lambda: self._catalog.replace(CatalogEntry(begun, (), ())))
-        sync_folder(self._folder)
-        sync_folder(self._folder.parent)
         return self._open_file
 
     def _add(self, growth: CatalogGrowth) -> None:
