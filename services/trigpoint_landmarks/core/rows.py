@@ -115,7 +115,7 @@ def _provenances(observations: Sequence[Observations]) -> Iterator[str]:
 def _is_same(held: Landmark, solved: Landmark) -> bool:
     if held.x_m != solved.x_m or held.y_m != solved.y_m:
         return False  # hardly ever are all others compared
-    return solved._replace(valid_from_version=held.valid_from_version) == held
+    return held.says_the_same_as(solved)
 
 
 def _version_row(version: SolvedVersion, frame: MapFrame) -> MapVersion:

@@ -76,6 +76,10 @@ class Landmark(NamedTuple):
     valid_from_version: int
     valid_to_version: int | None
 
+    def says_the_same_as(self, other: "Landmark") -> bool:
+        """Whether the two are the same in everything but the map versions they are valid in."""
+        return self[:-2] == other[:-2]
+
     def until(self, map_version: int) -> "Landmark":
         """The same, no longer valid from a version on."""
         return Landmark(*self[:-1], map_version)
