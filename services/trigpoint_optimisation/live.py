@@ -92,15 +92,22 @@ class LiveOptimisation:
             self._subscription.close()
 
     def step(self) -> bool:
-        """Whether there was something to take in; what is due is appended, and published."""
+        """Whether there was something to do; what is due is appended, and published."""
         if self._fleet is None and not self._begin():
             self._ready = True  # nothing can be placed before a frame is pinned
             return False
         taken = self._take()
         self._ready = self._ready or not taken
+        worked = taken or self._catch_up()
         self._solve()
-        self._tell()
-        return taken
+        return self._tell() or worked
+
+    def _catch_up(self) -> bool:
+        """Whether something waited that was taken in before."""
+        assert self._fleet is not None, "begun before"
+        waited, places = self._fleet.catch_up()
+        self._correct(places)
+        return waited
 
     def _wait(self, stop: threading.Event) -> None:
         if self._subscription is None:
@@ -186,11 +193,11 @@ class LiveOptimisation:
             rows.append(Envelope(EventIdentity(SOURCE, boot_id, sequence), place.stamp_ns, event))
         self._say(ODOMETRY_STREAM, rows)
 
-    def _tell(self) -> None:
-        """The landmarks that changed as the next version, once it is time."""
+    def _tell(self) -> bool:
+        """The landmarks that changed as the next version, once it is time; whether there were any."""
         now_s = time.monotonic()
         if self._fleet is None or now_s < self._told_s + self._settings.live.version_interval_s:
-            return
+            return False
         self._told_s = now_s
         changed = self._fleet.map.changed_landmarks(share=self._settings.live.moved_share)
         if changed:
@@ -199,12 +206,13 @@ class LiveOptimisation:
                 method=METHOD,
                 settings_json=settings_json(self._settings),
                 inputs=self._positions(),
-                landmark_count=len(self._fleet.map.landmarks),
+                landmark_count=self._fleet.map.told_count,
                 anchor_count=self._anchor_count,
                 wall_s=time.monotonic() - now_s,
                 base_version=self._version,
             )
             self._append_version((*changed, head), stamp_ns=self._newest_ns)
+        return bool(changed)
 
     def _positions(self) -> tuple[tuple[str, int], ...]:
         """How far each stream is taken in, by the version before or since."""
@@ -279,12 +287,11 @@ class LiveOptimisation:
         self._solved_inputs = found.inputs
         self._anchor_count = cast(MapSolved, found.events[-1]).anchor_count
         self._excluded = excluded_drives(logged_corrections(self._log))
-        places = self._fleet.begin_anew(
+        self._fleet.begin_anew(
             [event for event in found.events if isinstance(event, LandmarkSolved)],
             [event for event in found.events if isinstance(event, TrajectorySolved)],
             excluded=self._excluded,
         )
-        self._correct(places)
 
 
 def _is_vehicle(stream: str) -> bool:

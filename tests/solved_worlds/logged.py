@@ -1,7 +1,9 @@
 """A world's drives and labels as events in a log, as ingest would have appended them."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -9,6 +11,7 @@ from solved_worlds.examples import FRAME, World
 from trigpoint.events.codec import Event
 from trigpoint.events.drives import Drive
 from trigpoint.events.envelope import Envelope, EventIdentity
+from trigpoint.events.estimated import FixJudged
 from trigpoint.events.observed import (
     GnssFixReceived,
     ImuMeasured,
@@ -57,6 +60,25 @@ def drive_rows(drive: Drive) -> list[Envelope[Event]]:
     return [
         Envelope(EventIdentity(drive.vehicle, drive.boot_id, sequence), stamp_ns, event)
         for sequence, (stamp_ns, event) in enumerate(events)
+    ]
+
+
+def all_accepted(rows: Sequence[Envelope[Any]]) -> list[FixJudged]:
+    """The filter's word that every fix among a drive's events holds."""
+    return [
+        FixJudged(
+            vehicle=row.identity.source,
+            boot_id=row.identity.boot_id,
+            fix_sequence=row.identity.sequence,
+            accepted=True,
+            reason="inside gate",
+            nis=1.0,
+            limit=5.99,
+            innovation_x_m=0.0,
+            innovation_y_m=0.0,
+        )
+        for row in rows
+        if isinstance(row.event, GnssFixReceived)
     ]
 
 

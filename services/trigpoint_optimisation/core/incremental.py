@@ -5,7 +5,7 @@ thousands of factors and an update stays short.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import gtsam
 import numpy as np
@@ -21,9 +21,10 @@ Floats = NDArray[np.float64]
 RELINEARISE_M, RELINEARISE_RAD = 3.0, 0.05  # an estimate that moved less keeps its linearisation: a map that moves
 # as a whole keeps its shape, headings bend it
 RELINEARISE_EVERY = 10  # updates between two looks at which moved more
-WILDFIRE = 0.001  # changes smaller than this, in m and rad, are not passed on through the graph
+WILDFIRE = 0.003  # changes smaller than this, in m and rad, are not passed on through the graph
 ARM_SIGMA_M, ARM_SIGMA_RAD = 0.02, 0.01  # of the antenna on its keyframe
 ARM_LEAST_M = 0.5  # a shorter arm has no usable bearing
+LAST = 1  # group of what is eliminated last, which makes it the root; what is in no group goes before
 DATUM_SHARE = 0.9  # of the best-known landmark's variance is common to all: none is surer than what they share
 
 
@@ -136,16 +137,29 @@ class IncrementalGraph:
         self._factors.add(gtsam.BetweenFactorPoint2(fix_bias_key(drive, knot), key, fix_m, white))
         self._guesses.insert(key, pose[:2] + turn @ arm)
 
-    def update(self) -> None:
-        """Everything added is solved for. Raises ServiceError where it leaves a state undetermined."""
-        if self._factors.size() or self._guesses.size():
-            try:
-                self._solver.update(self._factors, self._guesses)
-            except (
-                RuntimeError
-            ) as error:  # gtsam names the state, not the cause; a restart begins from the last version
-                raise ServiceError(f"{self.pose_count} poses cannot be solved for: {error}") from error
-            self._factors, self._guesses = gtsam.NonlinearFactorGraph(), gtsam.Values()
+    def update(
+        self, *, newest: tuple[int, int] | None = None, near: Iterable[int] = (), nearer: Iterable[int] = ()
+    ) -> None:
+        """Everything added is solved for. The `newest` keyframe of a drive and landmarks `near` it stay at the root of
+        the solver's tree where the update touches them, and `nearer` ones are brought there: their covariances will be
+        asked for, and come ten times as soon from there. None of what was added may hold by these alone: an order
+        that leaves nothing to be eliminated before them has no end. Raises ServiceError where it leaves a state
+        undetermined."""
+        if not (self._factors.size() or self._guesses.size()):
+            return
+        last, raised = gtsam.KeyGroupMap(), gtsam.KeyList()
+        if newest is not None:
+            last.insert2(pose_key(*newest), LAST)
+        for key in map(landmark_key, near):
+            last.insert2(key, LAST)
+        for key in map(landmark_key, nearer):
+            if not self._guesses.exists(key):
+                raised.push_back(key)
+        try:
+            self._solver.update(self._factors, self._guesses, [], last if last.size() else None, None, raised)
+        except RuntimeError as error:  # gtsam names the state, not the cause; a restart begins from the last version
+            raise ServiceError(f"{self.pose_count} poses cannot be solved for: {error}") from error
+        self._factors, self._guesses = gtsam.NonlinearFactorGraph(), gtsam.Values()
 
     def pose(self, drive: int, keyframe: int) -> Floats:
         """A keyframe's pose (3,): x, y in m, heading in rad, map frame."""
@@ -175,14 +189,21 @@ class IncrementalGraph:
         turned: Floats = turn @ covariance @ turn.T
         return turned
 
-    def landmark_covariance(self, landmark: int) -> Floats:
-        """Covariance (2, 2) in m^2 of a landmark updated before."""
-        covariance: Floats = self._solver.marginalCovariance(landmark_key(landmark))
-        return covariance
+    def landmark_covariances(self, landmarks: Sequence[int]) -> Floats:
+        """Covariances (l, 2, 2) in m^2 of landmarks updated before: of many asked for together nearly as soon as of
+        one."""
+        if not landmarks:
+            return np.zeros((0, 2, 2))
+        keys = [landmark_key(landmark) for landmark in landmarks]
+        joint = self._solver.jointMarginalCovariance(keys).fullMatrix()
+        blocks: Floats = np.array([joint[at : at + 2, at : at + 2] for at in range(0, 2 * len(keys), 2)])
+        return blocks
 
     def seen_from(self, drive: int, keyframe: int, landmarks: Sequence[int]) -> tuple[Floats, Floats]:
         """Where landmarks (l) must be seen from a keyframe (l, 2), in its frame, and with which covariances (l, 2, 2):
         what the graph knows of the two together. All updated before."""
+        if not landmarks:
+            return np.zeros((0, 2)), np.zeros((0, 2, 2))
         keys = [pose_key(drive, keyframe), *(landmark_key(landmark) for landmark in landmarks)]
         joint = self._solver.jointMarginalCovariance(keys).fullMatrix()
         pose = self.pose(drive, keyframe)

@@ -1,5 +1,6 @@
 """The drives that are under way and the map they grow: a fold over their events, begun anew from each whole solve."""
 
+from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -21,6 +22,7 @@ from trigpoint_optimisation.settings import SolveSettings
 
 Floats = NDArray[np.float64]
 
+LEGS_MOST = 3  # led into the map in one update: hundreds wait once it begins anew
 LOOSENED = 4.0  # of a start's covariance: what it shares with the landmarks is not to be counted twice
 
 
@@ -46,10 +48,12 @@ def solved_start(path: TrajectorySolved) -> Start:
 
 @dataclass(slots=True)
 class _Followed:
-    """One drive: what makes its legs, those that may be needed again, its start."""
+    """One drive: what makes its legs, those that may be needed again and of them those not in the map yet, its
+    start."""
 
     drive: LiveDrive
     legs: list[Leg] = field(default_factory=list)
+    behind: deque[Leg] = field(default_factory=deque)
     start: Start | None = None
 
 
@@ -73,16 +77,24 @@ class LiveFleet:
         self.map = LiveMap(frame, settings, base=base)
 
     def take(self, row: Envelope[Observed]) -> list[DrivePlace]:
-        """Where the drive is now, if the event brought it to a new keyframe and it has a place."""
+        """Where the drive came to, if the event brought it to a new keyframe and it has a place."""
         name = (row.identity.source, row.identity.boot_id)
         followed = self._followed.get(name) or self._begun(name, row.event)
         places = []
         for leg in followed.drive.take(row):
             followed.legs.append(leg)
-            places += self._lead(name, followed, leg)
+            followed.behind.append(leg)
+            places += self._lead_on(name, followed)
             if not self.map.is_placed(name) and followed.start is None:
                 followed.legs = _still_needed(followed.legs, None)
         return places
+
+    def catch_up(self) -> tuple[bool, list[DrivePlace]]:
+        """A little of what waits, of one drive: whether anything did, and where the drive came to."""
+        for name, followed in self._followed.items():
+            if followed.behind:
+                return True, self._lead_on(name, followed)
+        return self.map.catch_up(), []
 
     def judged(self, verdict: FixJudged) -> None:
         """The filter's verdict on a fix; only accepted ones hold."""
@@ -98,12 +110,11 @@ class LiveFleet:
         trajectories: Sequence[TrajectorySolved],
         *,
         excluded: Iterable[DriveName],
-    ) -> list[DrivePlace]:
-        """The map begun anew from a whole solve, with what came since; where the drives are now."""
+    ) -> None:
+        """The map begun anew from a whole solve; what came since waits to be caught up with."""
         self.map = LiveMap(self._frame, self._settings, base=landmarks)
         self.excluded = frozenset(excluded)
         starts = {(path.vehicle, path.boot_id): solved_start(path) for path in trajectories if len(path.stamp_ns)}
-        newest: dict[DriveName, DrivePlace] = {}
         going_on = {name[0]: name for name in self._followed}  # a vehicle's newest boot
         ended = [n for n in self._followed if n in starts and going_on[n[0]] != n]
         for name in ended:
@@ -112,19 +123,22 @@ class LiveFleet:
         for name, followed in self._followed.items():
             followed.start = starts.get(name)
             followed.legs = _still_needed(followed.legs, followed.start)
-            for leg in followed.legs:
-                for track in leg.tracks:
-                    track.used = 0
-            for leg in followed.legs:
-                for place in self._lead(name, followed, leg):
-                    newest[name] = place
-        return list(newest.values())
+            followed.behind = deque(followed.legs)
+            for track in (track for leg in followed.legs for track in leg.tracks):
+                track.used = 0
 
     def _begun(self, name: DriveName, event: Observed) -> _Followed:
         described = event if isinstance(event, VehicleDescribed) else VehicleDescribed(vehicle=name[0])
         drive = LiveDrive(described, name[1], self._settings, point_scale=self._frame.point_scale)
         followed = self._followed[name] = _Followed(drive, start=self._starts.pop(name, None))
         return followed
+
+    def _lead_on(self, name: DriveName, followed: _Followed) -> list[DrivePlace]:
+        """The drive's oldest legs that wait, so few that an update stays short; where they bring it."""
+        places: list[DrivePlace] = []
+        for _ in range(min(LEGS_MOST, len(followed.behind))):
+            places = self._lead(name, followed, followed.behind.popleft()) or places
+        return places
 
     def _lead(self, name: DriveName, followed: _Followed, leg: Leg) -> list[DrivePlace]:
         """One leg into the map; legs before the drive's start are in the map's base already."""
@@ -139,7 +153,7 @@ class LiveFleet:
             return []
         if not self.map.knows(name):
             self.map.begin(described, name[1])
-        places = self.map.take({name: leg})
+        places = self.map.take(name, leg)
         for fix in leg.fixes:
             if fix.sequence in self._accepted.get(name, ()):
                 self.map.judged(name, fix.sequence)

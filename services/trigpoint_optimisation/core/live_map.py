@@ -1,7 +1,7 @@
 """The map as it stands between two whole solves: it takes drives leg by leg and gives landmarks and places."""
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from trigpoint_optimisation.core.graph import MIN_RANGE_M
 from trigpoint_optimisation.core.incremental import IncrementalGraph
 from trigpoint_optimisation.core.live_association import Candidate, answer, candidate, chi_square
 from trigpoint_optimisation.core.live_drive import HungFix, Leg
-from trigpoint_optimisation.core.live_landmarks import LiveLandmark, detected_name, landmark_of, unused_name
+from trigpoint_optimisation.core.live_landmarks import LiveLandmark, LiveLandmarks, detected_name
 from trigpoint_optimisation.core.live_placing import (
     LocalFix,
     Placed,
@@ -33,7 +33,9 @@ WAITING_M = 400.0  # of path that a drive without a place keeps: older things ar
 OPEN_M = 150.0  # of path after which a track that nothing decided is let go
 VOTED_EVERY_M = 10.0  # of path
 REACH_M = 12.0  # around where a track lies, within which landmarks may be its own
-CANDIDATES_MOST = 4  # of them, the nearest: the marginals of many are what an update takes longest for
+CANDIDATES_MOST = 4  # of them, the nearest
+LOOKS_MOST = 3  # legs of which an update takes in what was seen: hundreds wait once a drive has found its place
+TOLD_MOST = 60  # landmarks in a version: their covariances are what it takes longest for
 RETRIED_EVERY = 5  # keyframes: a track that nothing decides
 FOLLOWED_SIGMA_M = 0.15  # between a vehicle and a landmark it has in sight
 DISAGREEMENT = 25.0  # chi-square of a sighting that is not of its landmark
@@ -52,18 +54,22 @@ class LiveMap:
     """A map that grows by legs; `base` are the landmarks of the version it starts from."""
 
     def __init__(self, frame: MapFrame, settings: SolveSettings, *, base: Sequence[LandmarkSolved] = ()) -> None:
-        self.landmarks = [landmark_of(event) for event in base]
+        self._known = LiveLandmarks(base)
         self._frame, self._settings = frame, settings
         self._graph = IncrementalGraph()
         covariance = np.array([event.covariance_m2 for event in base]).reshape(-1, 2, 2)
-        self._point_m = np.array([event.position_m for event in base]).reshape(-1, 2)
-        self._graph.add_solved_landmarks(self._point_m, covariance)
+        self._graph.add_solved_landmarks(self._known.point_m, covariance)
         self._graph.update()
         self._drives: dict[DriveName, DriveInMap] = {}
         self._touched: set[int] = set()
         self._nis: deque[float] = deque(maxlen=NIS_KEPT)
         self._fix_nis: deque[float] = deque(maxlen=NIS_KEPT)
         self._conflicts = 0
+
+    @property
+    def landmarks(self) -> Sequence[LiveLandmark]:
+        """What is known of each landmark besides where it is."""
+        return self._known.all
 
     @property
     def pose_count(self) -> int:
@@ -101,15 +107,38 @@ class LiveMap:
         if drive is not None and fix_sequence in drive.hung:
             self._take_fix(drive, *drive.hung.pop(fix_sequence))
 
-    def take(self, legs: Mapping[DriveName, Leg]) -> list[DrivePlace]:
-        """One leg of each of these drives; where they are now, those that have a place."""
-        for name, leg in legs.items():
-            drive = self._drives[name]
-            self._extend(drive, leg)
-            if drive.placed:
-                self._look(drive, leg, leg.tracks)
-            self._graph.update()
-        return [self.place(name) for name in legs if self._drives[name].placed]
+    def take(self, name: DriveName, leg: Leg) -> list[DrivePlace]:
+        """One leg of a drive; where it is now, if it has a place. What it saw on the way is looked at later where much
+        of that waits."""
+        drive = self._drives[name]
+        self._extend(drive, leg)
+        self._look_on(drive)
+        return [self.place(name)] if drive.placed else []
+
+    @property
+    def told_count(self) -> int:
+        """How many landmarks were told of."""
+        return self._known.told_count
+
+    def catch_up(self) -> bool:
+        """A little of what waits to be looked at; whether there was any."""
+        behind = next((drive for drive in self._drives.values() if drive.unseen), None)
+        if behind is not None:
+            self._look_on(behind)
+        return behind is not None
+
+    def _look_on(self, drive: DriveInMap) -> None:
+        """The oldest legs that were not looked at, so few that an update stays short."""
+        for _ in range(min(LOOKS_MOST, len(drive.unseen))):
+            leg, before = drive.unseen.popleft(), drive.near
+            at_m = self._graph.pose(drive.index, leg.keyframe)[:2]
+            near = self._known.within(at_m, self._settings.detections.max_range_m).tolist()
+            self._refresh(near)
+            drive.near = frozenset(near)
+            self._look(drive, leg)
+            assert drive.newest is not None, "it has moved"
+            newest = drive.index, drive.newest.keyframe + 1
+            self._graph.update(newest=newest, near=near, nearer=sorted(drive.near - before))
 
     def place(self, name: DriveName) -> DrivePlace:
         """Where a placed drive is."""
@@ -127,28 +156,23 @@ class LiveMap:
         )
 
     def changed_landmarks(self, *, share: float) -> list[LandmarkSolved]:
-        """The landmarks that are new or moved by more than `share` of their sigma since they were told of last; from
-        now on they are told of."""
-        found = []
-        self._refresh()
-        for number, landmark in enumerate(self.landmarks):
-            said, point = landmark.said, self._point_m[number]
-            if said is not None:
-                moved_m = np.hypot(*(point - said.position_m))
-                sigma_m = np.sqrt(0.5 * np.trace(said.covariance_m2))
-                if moved_m <= share * sigma_m and not (number in self._touched and self._is_surer(number, said)):
-                    continue
-            landmark.said = landmark.solved(point.copy(), self._graph.landmark_covariance(number))
-            found.append(landmark.said)
-        self._touched.clear()
-        return found
+        """The landmarks that are new or moved by more than `share` of their sigma since they were told of last, or were
+        seen again and are known clearly better; of many those that moved most. From now on they are told of. One that
+        was not seen again keeps the covariance it was told with: it is known no worse."""
+        known = self._known
+        self._refresh(range(len(self.landmarks)))
+        moved = known.moved_sigmas()
+        due = [n for n in np.argsort(-moved, kind="stable")[:TOLD_MOST].tolist() if moved[n] > share]
+        seen = sorted(self._touched.difference(due))[: TOLD_MOST - len(due)]
+        asked = sorted([n for n in due if n in self._touched or np.isinf(moved[n])] + seen)
+        covariance = dict(zip(asked, self._graph.landmark_covariances(asked), strict=True))
+        surer = [n for n in seen if known.is_surer(n, covariance[n])]
+        self._touched.difference_update(due, seen)
+        return [known.told(n, covariance.get(n)) for n in sorted(due + surer)]
 
-    def _is_surer(self, number: int, said: LandmarkSolved) -> bool:
-        """Whether a landmark seen again is known clearly better than was said."""
-        return float(np.trace(self._graph.landmark_covariance(number))) < 0.7 * float(np.trace(said.covariance_m2))
-
-    def _refresh(self) -> None:
-        self._point_m = np.array([self._graph.point(n) for n in range(len(self.landmarks))]).reshape(-1, 2)
+    def _refresh(self, numbers: Iterable[int]) -> None:
+        for number in map(int, numbers):
+            self._known.point_m[number] = self._graph.point(number)
 
     def _extend(self, drive: DriveInMap, leg: Leg) -> None:
         for fix in leg.fixes:
@@ -156,8 +180,7 @@ class LiveMap:
         while len(drive.hung) > UNJUDGED_MOST:
             del drive.hung[next(iter(drive.hung))]
         if drive.placed:
-            drive.newest = leg
-            self._graph.add_motion(drive.index, leg.keyframe, leg.delta, leg.covariance)
+            self._move(drive, leg)
             return
         drive.waiting.append(leg)
         drive.waiting = [each for each in drive.waiting if each.path_m > leg.path_m - WAITING_M]
@@ -175,10 +198,8 @@ class LiveMap:
             return placed
         least = self._settings.detections.min_detections
         tracks = [track for track in drive.pending.values() if track.count >= least]
-        return drive.placing.take(drive.waiting, tracks, self._known())
-
-    def _known(self) -> Constellation:
-        return Constellation(point_m=self._point_m, kind=tuple(landmark.kind for landmark in self.landmarks))
+        known = Constellation(point_m=self._known.point_m, kind=self._known.kind)
+        return drive.placing.take(drive.waiting, tracks, known)
 
     def _start(self, drive: DriveInMap, placed: Placed) -> None:
         """The drive in the graph from a keyframe on, with what waited since."""
@@ -187,16 +208,17 @@ class LiveMap:
         legs = [leg for leg in drive.waiting if leg.keyframe >= placed.keyframe]
         drive.waiting = []
         for leg in legs:
-            drive.newest = leg
-            self._graph.add_motion(drive.index, leg.keyframe, leg.delta, leg.covariance)
+            self._move(drive, leg)
         for fix in [fix for fix in drive.fixes.values() if fix.keyframe >= placed.keyframe]:
             self._add_fix(drive, fix, legs[fix.keyframe - placed.keyframe].start_ns)
         drive.fixes.clear()
+        drive.pending.clear()
         self._graph.update()
-        waited, drive.pending = drive.pending, {}
-        for leg in legs[:-1]:
-            self._look(drive, leg, [waited[track.number] for track in leg.tracks if track.number in waited])
-            self._graph.update()
+
+    def _move(self, drive: DriveInMap, leg: Leg) -> None:
+        drive.newest = leg
+        self._graph.add_motion(drive.index, leg.keyframe, leg.delta, leg.covariance)
+        drive.unseen.append(leg)
 
     def _take_fix(self, drive: DriveInMap, keyframe: int, fix: HungFix) -> None:
         fix_m = map_points_from_wgs84(np.array([fix.lat_deg]), np.array([fix.lon_deg]), self._frame)[0]
@@ -226,16 +248,16 @@ class LiveMap:
             fixes=HONEST_EDGES,
         )
 
-    def _look(self, drive: DriveInMap, leg: Leg, tracks: Sequence[Track]) -> None:
+    def _look(self, drive: DriveInMap, leg: Leg) -> None:
         """What was seen from a keyframe goes into the graph, as far as it is known what it is."""
-        known = [track for track in tracks if track.number in drive.of]
+        known = [track for track in leg.tracks if track.number in drive.of]
         self._check(drive, leg, known)
         for track in known:
             if track.number in drive.of:
                 self._sight(drive, leg, track)
         least = self._settings.detections.min_detections
         fresh = [
-            track for track in tracks if track.number not in drive.of and (track.count >= least or track.signature)
+            track for track in leg.tracks if track.number not in drive.of and (track.count >= least or track.signature)
         ]
         self._associate(drive, leg, fresh)
         self._vote(drive, leg)
@@ -281,7 +303,7 @@ class LiveMap:
         by_number = {track.number: track for track in fresh}
         fresh = [track for track in fresh if track.number not in drive.pending or not leg.keyframe % RETRIED_EVERY]
         fresh = [track for track in fresh if usable(track, drive.first_keyframe, leg.keyframe)]
-        found = answer({track.number: self._candidates(drive, leg.keyframe, track) for track in fresh})
+        found = answer(self._candidates(drive, leg.keyframe, fresh))
         for number, landmark in found.of.items():
             self._settle(drive, leg, by_number[number], landmark)
         for number in found.new:
@@ -296,38 +318,46 @@ class LiveMap:
         drive.pending_since_m.pop(track.number, None)
         self._sight(drive, leg, track)
 
-    def _candidates(self, drive: DriveInMap, keyframe: int, track: Track) -> list[Candidate]:
-        """The landmarks that a track may be of, from the keyframe it was seen from last."""
-        seen = usable(track, drive.first_keyframe, keyframe)
-        at = seen[-1].keyframe
-        point_m, noise = mean_seen([each for each in seen if each.keyframe == at])
+    def _candidates(self, drive: DriveInMap, keyframe: int, tracks: Sequence[Track]) -> dict[int, list[Candidate]]:
+        """The landmarks that each of these tracks, all seen from this keyframe, may be of, by track number. What is
+        expected is asked for all of them at once: that takes as long as for one."""
+        pose, seen, near = self._graph.pose(drive.index, keyframe), {}, {}
+        for track in tracks:
+            seen[track.number] = point_m, _ = mean_seen([each for each in track.seen if each.keyframe == keyframe])
+            near[track.number] = self._near(drive, track, transform_points(pose, point_m))
+        asked = sorted({landmark for found in near.values() for landmark in found})
+        expected, covariance = self._graph.seen_from(drive.index, keyframe, asked)
+        row = {landmark: number for number, landmark in enumerate(asked)}
+        found = {
+            number: [
+                candidate(n, seen[number][0], expected[row[n]], noise=seen[number][1], expectation=covariance[row[n]])
+                for n in landmarks
+            ]
+            for number, landmarks in near.items()
+        }
+        return found | {track.number: self._named(track) for track in tracks if track.signature}
+
+    def _named(self, track: Track) -> list[Candidate]:
+        """The landmarks of a track's signature."""
+        found = self._known.signed(track.signature)
+        return [Candidate(landmark=n, chi_square=0.0, distance_m=0.0, sigma_m=0.0) for n in found]
+
+    def _near(self, drive: DriveInMap, track: Track, at_m: Floats) -> list[int]:
+        """The nearest landmarks of a nameless track's kind that it does not stand beside."""
         if track.signature:
-            named = [n for n, one in enumerate(self.landmarks) if one.signature == track.signature]
-            return [Candidate(landmark=n, chi_square=0.0, distance_m=0.0, sigma_m=0.0) for n in named]
-        in_map = transform_points(self._graph.pose(drive.index, at), point_m)
-        taken = {drive.of[other] for other in track.apart if other in drive.of}
-        near = np.nonzero(np.hypot(*(self._point_m - in_map).T) <= REACH_M)[0]
-        kind = track.kind
-        near = near[np.argsort(np.hypot(*(self._point_m[near] - in_map).T), kind="stable")]
-        possible = [int(n) for n in near if n not in taken and self.landmarks[n].kind == kind][:CANDIDATES_MOST]
-        if not possible:
             return []
-        expected, covariance = self._graph.seen_from(drive.index, at, possible)
-        return [
-            candidate(n, point_m, expected[row], noise=noise, expectation=covariance[row])
-            for row, n in enumerate(possible)
-        ]
+        beside = {drive.of[other] for other in track.apart if other in drive.of}
+        near = [n for n in self._known.within(at_m, REACH_M).tolist() if n not in beside]
+        return [n for n in near if self.landmarks[n].kind == track.kind][:CANDIDATES_MOST]
 
     def _new_landmark(self, drive: DriveInMap, leg: Leg, track: Track) -> int:
         sequence, row = track.first
         name = detected_name(drive.described.vehicle, drive.boot_id, sequence=sequence, row=row)
-        name = track.signature or unused_name(name, (landmark.name for landmark in self.landmarks))
         last = usable(track, drive.first_keyframe, leg.keyframe)[-1]
         point_m = transform_points(self._graph.pose(drive.index, last.keyframe), last.point_m)
-        self.landmarks.append(LiveLandmark(name=name, kind=track.kind, signature=track.signature))
-        self._point_m = np.vstack([self._point_m, point_m])
-        self._graph.add_landmark(len(self.landmarks) - 1, point_m)
-        return len(self.landmarks) - 1
+        number = self._known.add(name, point_m, kind=track.kind, signature=track.signature)
+        self._graph.add_landmark(number, point_m)
+        return number
 
     def _vote(self, drive: DriveInMap, leg: Leg) -> None:
         """Tracks that one landmark alone could not decide, decided by one joint shift of them all, or let go."""
@@ -338,17 +368,15 @@ class LiveMap:
         if len(drive.pending) < detections.min_votes or leg.path_m < drive.voted_m + VOTED_EVERY_M:
             return
         drive.voted_m = leg.path_m
-        self._refresh()
         tracks = [each for each in drive.pending.values() if usable(each, drive.first_keyframe, leg.keyframe)]
-        taken = set(drive.of.values())
-        free = np.array([n for n in range(len(self.landmarks)) if n not in taken], dtype=np.int64)
-        if len(tracks) < detections.min_votes or not len(free):
+        if len(tracks) < detections.min_votes:
             return
         at = np.array([self._in_map(drive, leg, track) for track in tracks])
-        near = free[np.hypot(*(self._point_m[free] - at.mean(axis=0)).T) < OPEN_M]
+        near = np.setdiff1d(self._known.within(at.mean(axis=0), OPEN_M), list(drive.of.values()))
         if len(near) < detections.min_votes:
             return
-        for a, b in joint_shift_pairs(at, self._point_m[near], settings=detections):
+        self._refresh(near)
+        for a, b in joint_shift_pairs(at, self._known.point_m[near], settings=detections):
             landmark = int(near[b])
             if self.landmarks[landmark].kind == tracks[a].kind:
                 self._settle(drive, leg, tracks[a], landmark)

@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 
 from solved_worlds.examples import FRAME, Lap, World, world
+from solved_worlds.logged import all_accepted
 from trigpoint.events.codec import Event
 from trigpoint.events.drives import Drive
 from trigpoint.events.envelope import Envelope, EventIdentity
-from trigpoint.events.estimated import FixJudged
 from trigpoint.events.mapped import LandmarkSolved, MapSolved, OdometryCorrected
 from trigpoint.events.observed import (
     GnssFixReceived,
@@ -72,23 +72,9 @@ def numbered(source: str, boot_id: str, events: Iterable[tuple[int, Event]]) -> 
 def accepted(rows: list[Envelope[Event]]) -> list[Envelope[Event]]:
     """The filter's word that every fix holds."""
     fixes = [row for row in rows if isinstance(row.event, GnssFixReceived)]
-    verdicts = [
-        FixJudged(
-            vehicle=row.identity.source,
-            boot_id=row.identity.boot_id,
-            fix_sequence=row.identity.sequence,
-            accepted=True,
-            reason="inside gate",
-            nis=1.0,
-            limit=5.99,
-            innovation_x_m=0.0,
-            innovation_y_m=0.0,
-        )
-        for row in fixes
-    ]
     return [
         Envelope(EventIdentity("filtering", rows[0].identity.source, n), row.stamp_ns, verdict)
-        for n, (row, verdict) in enumerate(zip(fixes, verdicts, strict=True))
+        for n, (row, verdict) in enumerate(zip(fixes, all_accepted(rows), strict=True))
     ]
 
 
