@@ -18,6 +18,7 @@ from typing import Any
 SERVICES = ("router", "ingest", "filtering", "optimisation", "landmarks")
 LOOK_S = 0.02  # between two looks at what is waited for
 SOON_S = 60.0  # what takes a second here takes many beside eight other jobs
+START_S = 240.0  # for every process of a fleet, one after the other
 CLEAN = {name: text for name, text in os.environ.items() if not name.startswith("TRIGPOINT_")}
 
 
@@ -38,6 +39,21 @@ def wait_until(holds: Callable[[], bool], what: str, *, within_s: float = SOON_S
     while not holds():
         assert time.monotonic() < deadline_s, f"not within {within_s:g} s: {what}"
         pause.wait(LOOK_S)
+
+
+def runs(pid: int) -> bool:
+    """Whether the process is there and not merely waiting to be waited for."""
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0]
+    except FileNotFoundError:
+        return False
+    return state not in ("Z", "X")
+
+
+def children_of(pid: int) -> list[int]:
+    """The processes that one has begun, from any of its threads, and that are there."""
+    lists = Path(f"/proc/{pid}/task").glob("*/children")
+    return [int(word) for path in lists for word in path.read_text(encoding="ascii").split()]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,7 +96,7 @@ class Fleet:
 
     def wait_ready(self, *processes: str) -> None:
         """Returns once all of them are ready."""
-        wait_until(lambda: all(self.is_ready(process) for process in processes), f"{processes} ready")
+        wait_until(lambda: all(map(self.is_ready, processes)), f"{processes} ready", within_s=START_S)
 
 
 def fleet_in(folder: Path, toml: str = "") -> Fleet:

@@ -2,9 +2,10 @@
 
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from typing import cast
 
@@ -42,6 +43,12 @@ def span_ns(rows: Rows) -> tuple[int, int]:
     return min(stamps), max(stamps)
 
 
+def first_part(rows: Rows, duration_s: float) -> Rows:
+    """What was measured in the first so many seconds of a drive."""
+    until_ns = span_ns(rows)[0] + round(duration_s * NS_PER_S)
+    return [row for row in rows if row.stamp_ns <= until_ns]
+
+
 def again(rows: Rows, times: int) -> Rows:
     """The same drive, driven again so many breaks later under a boot of its own."""
     first_ns, last_ns = span_ns(rows)
@@ -54,6 +61,14 @@ def again(rows: Rows, times: int) -> Rows:
         )  # fmt: skip
         for row in rows
     ]
+
+
+def again_until(rows: Rows, enough: Callable[[int], bool]) -> Iterator[Rows]:
+    """The same drive again and again, until so many times are enough."""
+    for times in count():
+        yield again(rows, times)
+        if enough(times + 1):
+            return
 
 
 def paced(rows: Rows, speed: float, stop: threading.Event) -> Iterator[Envelope[Observed]]:
@@ -73,7 +88,7 @@ class Vehicle(threading.Thread):
         super().__init__(name="vehicle", daemon=True)
         self._drives, self._endpoint, self._speed, self._stop_driving = drives, endpoint, speed, stop
         self.error: Exception | None = None
-        self.sent = 0
+        self.sent = self.rounds = 0
 
     def run(self) -> None:
         settings = ZenohSettings(mode="client", connect=(self._endpoint,), connect_timeout_s=30.0)
@@ -81,6 +96,7 @@ class Vehicle(threading.Thread):
             with ZenohBus(settings) as bus:
                 for rows in self._drives:
                     replay_rows(self._counted(rows), bus, settings=PATIENT)
+                    self.rounds += 1
                     if self._stop_driving.is_set():
                         break
         except Exception as error:  # raised in the thread that waits for this one

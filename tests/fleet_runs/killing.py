@@ -1,34 +1,31 @@
 """Services killed by signal 9 at random moments, and started again by whoever supervises them."""
 
-import http.client
 import json
 import os
 import signal
 import threading
-from collections.abc import Sequence
+import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from random import Random
 
 from command_runs.processes import Fleet, wait_until
-from fleet_runs.running import alone
+from fleet_runs.running import SETTLE_S, alone
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Killing:
-    """Each of the services killed so many times, in random order, after a random wait each."""
+    """Each of the services killed so many times, at random moments within a time, independently of the others."""
 
     services: tuple[str, ...]
     times_each: int
-    wait_min_s: float = 0.1
-    wait_max_s: float = 3.0
+    within_s: float
     seed: int = 1
 
-    def order(self) -> list[tuple[str, float]]:
-        """Whom to kill, and after which wait."""
-        die = Random(self.seed)
-        names = [name for name in self.services for _ in range(self.times_each)]
-        die.shuffle(names)
-        return [(name, die.uniform(self.wait_min_s, self.wait_max_s)) for name in names]
+    def moments_s(self, name: str) -> list[float]:
+        """When a service is killed, in order, from the beginning on."""
+        die = Random(f"{self.seed}/{name}")
+        return sorted(die.uniform(0.0, self.within_s) for _ in range(self.times_each))
 
 
 def pid_of(fleet: Fleet, name: str) -> int | None:
@@ -39,22 +36,26 @@ def pid_of(fleet: Fleet, name: str) -> int | None:
 
 def kill(fleet: Fleet, name: str) -> None:
     """The service killed; another process of it runs when this returns."""
-    wait_until(lambda: pid_of(fleet, name) is not None, f"{name} runs")
     killed = pid_of(fleet, name)
-    assert killed is not None
+    assert killed is not None, f"{name} is at work"
     os.kill(killed, signal.SIGKILL)
     wait_until(lambda: pid_of(fleet, name) not in (None, killed), f"another {name} runs")
 
 
-def kill_all(fleet: Fleet, killing: Killing) -> Sequence[str]:
-    """Who was killed, in order."""
-    pause = threading.Event()
-    killed = []
-    for name, wait_s in killing.order():
-        pause.wait(wait_s)
-        kill(fleet, name)
-        killed.append(name)
-    return killed
+def kill_all(fleet: Fleet, killing: Killing) -> None:
+    """Every service killed as often as it should be, each time at work: not before its moment, nor before it is."""
+    began_s = time.monotonic()
+
+    def kill_one(name: str) -> None:
+        pause = threading.Event()
+        for moment_s in killing.moments_s(name):
+            pause.wait(max(began_s + moment_s - time.monotonic(), 0.0))
+            wait_until(lambda: is_at_work(fleet, name), f"{name} at work", within_s=SETTLE_S)
+            kill(fleet, name)
+
+    with ThreadPoolExecutor(max_workers=len(killing.services)) as pool:
+        for done in [pool.submit(kill_one, name) for name in killing.services]:
+            done.result()
 
 
 def kill_while_catching_up(fleet: Fleet, name: str, *, times: int, seed: int = 1, wait_max_s: float = 0.5) -> None:
@@ -72,4 +73,4 @@ def kill_while_catching_up(fleet: Fleet, name: str, *, times: int, seed: int = 1
 def is_at_work(fleet: Fleet, name: str) -> bool:
     """Whether a service runs, ready or not."""
     status, page = fleet.page(name, "/healthz")
-    return status == http.client.OK and json.loads(page)["stage"] == "running"
+    return status != 0 and json.loads(page)["stage"] == "running"

@@ -1,15 +1,34 @@
 """Load on a running fleet for as long as is wanted, and what its processes hold meanwhile."""
 
+import json
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import count
+from pathlib import Path
 
-from command_runs.processes import Fleet, trigpoint_process
-from fleet_runs.driving import Rows, again, vehicles_on_the_road
+from command_runs.processes import Fleet, fleet_in, trigpoint_process
+from fleet_runs.driving import Rows, again_until, small_campus_drives, vehicles_on_the_road
 from fleet_runs.footprint import Footprint, watched
 from fleet_runs.killing import pid_of
+from fleet_runs.running import FOLLOWERS
+from landmark_databases.cluster import Cluster
 from trigpoint.events.observed import VehicleDescribed
+
+SERVICES = ("router", "ingest", *FOLLOWERS)
+VEHICLES = 10
+LOOKS = 360  # at the processes, in the time of a soak
+SOAKED = """
+[optimisation.live]
+pose_limit = {poses}
+solve_interval_s = 60.0
+solver_niceness = 0
+[up]
+services = {services}
+[database]
+url = {url}
+password_file = {password_file}
+"""
+POSES = 2000  # in the live graph, which begins anew beyond: every few minutes, as it does in hours by itself
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,14 +61,14 @@ def driven_by(rows: Rows, vehicle: str) -> Rows:
     ]
 
 
-def without_end(rows: Rows) -> Iterator[Rows]:
-    """The drive driven again and again, each time under a boot of its own."""
-    return (again(rows, times) for times in count())
+def never(times: int) -> bool:
+    """No number of times is enough."""
+    return False
 
 
 def loaded(fleet: Fleet, drives: Sequence[Rows], services: Sequence[str], load: Load) -> Loaded:
     """A fleet under load, stopped in order afterwards; every event that was sent is acknowledged."""
-    fleets = [without_end(driven_by(drives[n % len(drives)], f"veh-{n}")) for n in range(load.vehicles)]
+    fleets = [again_until(driven_by(drives[n % len(drives)], f"veh-{n}"), never) for n in range(load.vehicles)]
     with trigpoint_process(fleet.folder, "up", "--config", fleet.config) as up:
         fleet.wait_ready(*services)
         pids = {name: pid for name in services if (pid := pid_of(fleet, name)) is not None}
@@ -61,3 +80,16 @@ def loaded(fleet: Fleet, drives: Sequence[Rows], services: Sequence[str], load: 
         assert {name: pid_of(fleet, name) for name in services} == pids, up.err
         assert up.stop() == 0, up.err
     return Loaded(sent=sum(vehicle.sent for vehicle in vehicles), footprints=footprints)
+
+
+def soaked(folder: Path, cluster: Cluster, *, duration_s: float) -> Mapping[str, Sequence[Footprint]]:
+    """What each process of a fleet with a PostgreSQL server held while ten vehicles drove through the same streets
+    again and again. Its live graph is small, so that whatever is there beyond its bound is what grows."""
+    values = {
+        "services": list(SERVICES),
+        "url": cluster.url(cluster.created()),
+        "password_file": str(cluster.password_file),
+    }
+    toml = SOAKED.format(poses=POSES, **{name: json.dumps(value) for name, value in values.items()})
+    load = Load(vehicles=VEHICLES, duration_s=duration_s, interval_s=duration_s / LOOKS)
+    return loaded(fleet_in(folder / "fleet", toml), small_campus_drives(folder / "campus"), SERVICES, load).footprints

@@ -11,7 +11,7 @@ from trigpoint.logs.readings import MAPPED_STREAM
 from trigpoint_optimisation.app import input_positions
 
 FOLLOWERS = ("filtering", "optimisation", "landmarks")  # in the order events go through them
-SETTLE_S = 300.0  # for a service to take in all there is, beside eight other jobs
+SETTLE_S = 900.0  # for a service to take in all there is, beside eight other jobs
 LIVE = "[optimisation.live]\nsettle_s = 1.0\nsolver_niceness = 0\n"
 QUICK = LIVE + "[up]\nservices = {services}\nbackoff_first_s = 0.05\nbackoff_ceiling_s = 0.2\n"
 LAG = "trigpoint_projection_lag_events"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from command_runs.processes import Fleet, Process, fleet_in, trigpoint_process, wait_until
+from command_runs.processes import Fleet, Process, fleet_in, runs, trigpoint_process, wait_until
 
 TWO = '[up]\nservices = ["router", "ingest"]\nbackoff_first_s = 0.05\nstop_limit_s = 1.0\nfailing_count = 3\n'
 
@@ -16,15 +16,6 @@ TWO = '[up]\nservices = ["router", "ingest"]\nbackoff_first_s = 0.05\nstop_limit
 @pytest.fixture
 def fleet(tmp_path: Path) -> Fleet:
     return fleet_in(tmp_path, TWO)
-
-
-def runs(pid: int) -> bool:
-    """Whether the process is there and not merely waiting to be waited for."""
-    try:
-        state = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0]
-    except FileNotFoundError:
-        return False
-    return state not in ("Z", "X")
 
 
 def pids(fleet: Fleet) -> dict[str, int]:

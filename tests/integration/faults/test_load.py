@@ -7,8 +7,9 @@ import pytest
 
 from fleet_runs.driving import small_campus_drives
 from fleet_runs.footprint import MIB, Footprint, growth, last_share
-from fleet_runs.load import Load, loaded
-from fleet_runs.running import FOLLOWERS, fleet_of
+from fleet_runs.load import Load, loaded, soaked
+from fleet_runs.running import fleet_of
+from landmark_databases.cluster import Cluster
 
 SOAK_S = float(os.environ.get("SOAK_S", "1800"))  # of the long one; its last two thirds are held flat
 HANDLES = 4  # a rotated file is open beside its successor, a request beside the endpoint
@@ -30,10 +31,8 @@ def test_router_and_ingest_hold_no_more_after_some_seconds_of_load(tmp_path: Pat
 
 
 @pytest.mark.slow
-def test_every_process_is_flat_in_the_last_two_thirds_of_half_an_hour_of_load(tmp_path: Path) -> None:
-    fleet = fleet_of(tmp_path)
-    services = ("router", "ingest", *FOLLOWERS)
-    load = Load(vehicles=10, duration_s=SOAK_S, interval_s=min(5.0, SOAK_S / 60.0))
-    found = loaded(fleet, small_campus_drives(tmp_path / "campus"), services, load)
-    shares = {name: growth(last_share(one, 2 / 3)) for name, one in found.footprints.items()}
+@pytest.mark.postgis
+def test_every_process_is_flat_in_the_last_two_thirds_of_half_an_hour_of_load(tmp_path: Path, postgis: Cluster) -> None:
+    found = soaked(tmp_path, postgis, duration_s=SOAK_S)
+    shares = {name: growth(last_share(one, 2 / 3)) for name, one in found.items()}
     assert {name: one for name, one in shares.items() if one.resident_share > 0.05 or one.handles > HANDLES} == {}
