@@ -67,7 +67,7 @@ class RefusalLog:
 
 @contextmanager
 def opened(settings: Settings, instruments: Instruments) -> Iterator[Service]:
-    """A router of the configuration. Raises InputError, and ServiceError where an endpoint cannot be had."""
+    """A router of the configuration. Raises InputError."""
     refusals = RefusalLog(instruments)
     with closing(ZenohRouter(settings.router, root=settings.fleet.root, tell=refusals.hear)) as router:
         yield router
