@@ -4,8 +4,10 @@ import json
 import math
 from dataclasses import replace
 
+import hypothesis.strategies as st
 import numpy as np
 import pytest
+from hypothesis import given, settings
 
 from landmark_maps.examples import (
     LABEL_STREAM,
@@ -22,8 +24,9 @@ from landmark_maps.examples import (
 from trigpoint.events.corrected import AnchorRetracted, Corrected
 from trigpoint.events.envelope import LogPosition
 from trigpoint.events.mapped import LandmarkSolved, Mapped
-from trigpoint.landmarks.model import Landmark, MapChange
-from trigpoint_landmarks.core.rows import labels_within, make_valid, map_change
+from trigpoint.events.solved_landmarks import in_columns
+from trigpoint.landmarks.model import Landmark, MapChange, provenance_json
+from trigpoint_landmarks.core.rows import labels_within, landmark_rows, make_valid, map_change
 from trigpoint_landmarks.core.versions import solved_versions
 
 
@@ -163,3 +166,28 @@ def test_a_landmark_both_named_and_removed_is_removed() -> None:
     first = changed(1, [solved_landmark("L1", 1.0, 0.0)])
     second = delta(2, [solved_landmark("L1", 2.0, 0.0, map_version=2)], removed=("L1", "never there"), held=first)
     assert (second.opened, second.closed) == ((), ("L1",))
+
+
+places_m = st.floats(-20_000.0, 20_000.0)
+variances_m2 = st.floats(1e-6, 100.0)
+
+
+@st.composite
+def any_landmark(draw: st.DrawFn) -> LandmarkSolved:
+    """A landmark anywhere on the map, with any ellipse."""
+    east_m2, north_m2 = draw(variances_m2), draw(variances_m2)
+    shared_m2 = draw(st.floats(-0.99, 0.99)) * math.sqrt(east_m2 * north_m2)
+    return replace(
+        solved_landmark(draw(st.text(max_size=4)), draw(places_m), draw(places_m)),
+        covariance_m2=np.array([[east_m2, shared_m2], [shared_m2, north_m2]]),
+        anchors=draw(st.lists(st.text(max_size=3), max_size=2).map(tuple)),
+        observations=draw(st.lists(st.tuples(st.text(max_size=3), st.just("boot-1"), st.integers()), max_size=3)),
+    )
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(any_landmark(), max_size=8))
+def test_rows_made_side_by_side_are_those_made_one_by_one(events: list[LandmarkSolved]) -> None:
+    one_by_one = [row for event in events for row in landmark_rows(in_columns([event]), frame())]
+    assert landmark_rows(in_columns(events), frame()) == one_by_one
+    assert [row.provenance for row in one_by_one] == [provenance_json(event.observations) for event in events]
