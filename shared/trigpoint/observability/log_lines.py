@@ -2,6 +2,7 @@
 
 import json
 import logging
+import math
 import sys
 import threading
 import traceback
@@ -68,7 +69,9 @@ class LineFormatter(logging.Formatter):
         return values
 
     def _clean(self, value: object) -> object:
-        if isinstance(value, bool | int | float) or value is None:
+        if isinstance(value, float):
+            return value if math.isfinite(value) else str(value)  # JSON has no other numbers
+        if isinstance(value, bool | int) or value is None:
             return value
         if isinstance(value, list | tuple):
             return [self._clean(item) for item in value]

@@ -5,6 +5,8 @@ import json
 import logging
 from typing import Any
 
+import pytest
+
 from trigpoint.observability.log_lines import LineFormatter, Secrets
 
 RECORD = {"name": "trigpoint.x", "levelno": logging.WARNING, "levelname": "WARNING", "created": 0.25}
@@ -27,6 +29,10 @@ def test_a_record_is_one_json_object_on_one_line() -> None:
         "vehicle": "veh-a",
         "lag_s": 0.5,
     }
+
+
+def test_a_number_that_json_does_not_have_is_logged_as_text() -> None:
+    assert json.loads(line({"msg": "solved", "sigma_m": float("nan")}), parse_constant=pytest.fail)["sigma_m"] == "nan"
 
 
 def test_a_plain_record_is_one_line_with_what_came_along() -> None:
