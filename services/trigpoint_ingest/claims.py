@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from trigpoint.bus.ports import Bus, Claim
 from trigpoint.errors import ServiceError
 from trigpoint.events.keys import DEFAULT_ROOT
-from trigpoint.events.uplink import claim_expressions, claim_key
+from trigpoint.events.uplink import claim_expressions, claim_key, claimed_by
 
 NS_DIGITS = 20  # so that claims sort by the time they were made
 
@@ -24,12 +24,16 @@ class VehicleClaims:
 
     def require(self) -> None:
         """Nothing, if nobody known of made an earlier claim. Raises ServiceError."""
-        for name in self._names:
-            for expression in claim_expressions(name, root=self._root):
-                earlier = [key for key in self._bus.claimed(expression) if key.rpartition("/")[2] < self.claim_id]
-                if earlier:
-                    what = "the whole fleet" if name is None else f"vehicle {name!r}"
-                    raise ServiceError(f"{what} cannot be claimed: another ingest holds {earlier[0]}, one at a time")
+        for expression in claim_expressions(root=self._root):  # two looks, however many vehicles
+            for key in self._bus.claimed(expression):
+                name, claim_id = claimed_by(key)
+                if claim_id < self.claim_id and self._excludes(name):
+                    what = "the whole fleet" if None in self._names else f"vehicle {name or self._names[0]!r}"
+                    raise ServiceError(f"{what} cannot be claimed: another ingest holds {key}, one at a time")
+
+    def _excludes(self, name: str | None) -> bool:
+        """Whether a claim to this vehicle, None for all of the fleet, and one's own cannot both hold."""
+        return name is None or None in self._names or name in self._names
 
     def release(self) -> None:
         """Nothing claimed any more; again: no effect."""

@@ -58,10 +58,16 @@ def claim_key(vehicle: str | None, claim_id: str, *, root: str = DEFAULT_ROOT) -
     return f"{valid_name(root)}/{KEY_VERSION}/live/{name}/{valid_name(claim_id)}"
 
 
-def claim_expressions(vehicle: str | None, *, root: str = DEFAULT_ROOT) -> tuple[str, str]:
-    """The expressions that match every claim which excludes one's own to a vehicle, or to all of the fleet."""
+def claim_expressions(*, root: str = DEFAULT_ROOT) -> tuple[str, str]:
+    """The expressions that match every claim to a vehicle, and to all of the fleet."""
     live = f"{valid_name(root)}/{KEY_VERSION}/live"
-    return f"{live}/{VEHICLE_CLAIM}/{'*' if vehicle is None else valid_name(vehicle)}/*", f"{live}/{FLEET_CLAIM}/*"
+    return f"{live}/{VEHICLE_CLAIM}/*/*", f"{live}/{FLEET_CLAIM}/*"
+
+
+def claimed_by(key: str) -> tuple[str | None, str]:
+    """The vehicle a key claims, None for all of the fleet, and the claim's id."""
+    *_, kind, name, claim_id = key.split("/")
+    return name if kind == VEHICLE_CLAIM else None, claim_id
 
 
 def acknowledgement_key(vehicle: str, *, root: str = DEFAULT_ROOT) -> str:

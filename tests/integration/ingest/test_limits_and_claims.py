@@ -16,6 +16,7 @@ from trigpoint.events.uplink import uplink_key
 from trigpoint.logs.memory_log import MemoryLog
 from trigpoint.observability.metrics import Instruments
 from trigpoint_ingest.app import IngestService
+from trigpoint_ingest.claims import VehicleClaims
 from trigpoint_ingest.settings import IngestSettings
 
 Rows = list[Envelope[Observed]]
@@ -178,6 +179,22 @@ def test_ingests_of_different_vehicles_work_side_by_side() -> None:
     ):
         run_for_a_moment(first)
         run_for_a_moment(second)
+
+
+class CountingBus(MemoryBus):
+    """A bus that counts the looks at claims."""
+
+    looks = 0
+
+    def claimed(self, key_expression: str) -> tuple[str, ...]:
+        self.looks += 1
+        return super().claimed(key_expression)
+
+
+def test_claims_are_looked_at_twice_however_many_vehicles_there_are() -> None:
+    with CountingBus() as bus:
+        VehicleClaims(bus, [f"veh-{number}" for number in range(100)]).require()
+        assert bus.looks == 2
 
 
 def test_what_a_closed_ingest_claimed_is_free() -> None:

@@ -60,7 +60,7 @@ def test_a_vehicle_sends_and_is_acknowledged_under_its_own_name_only() -> None:
 @pytest.mark.parametrize("vehicle", ["veh-a", None])
 def test_ingest_may_claim_its_vehicles_and_see_who_else_does(vehicle: str | None) -> None:
     claim = claim_key(vehicle, "1", root=ROOT).removeprefix(f"{ROOT}/v1/")
-    looks = [one.removeprefix(f"{ROOT}/v1/") for one in claim_expressions(vehicle, root=ROOT)]
+    looks = [one.removeprefix(f"{ROOT}/v1/") for one in claim_expressions(root=ROOT)]
     assert allowed(Role.INGEST, "claim", claim)
     assert all(look.startswith("live/") for look in looks)
     assert GRANTS[Role.INGEST].watch == ("live/**",)
