@@ -12,6 +12,8 @@ from random import Random
 from command_runs.processes import Fleet, wait_until
 from fleet_runs.running import SETTLE_S, alone
 
+WORK_MAX_S = 3.0  # of a service between its start and its end
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Killing:
@@ -43,14 +45,15 @@ def kill(fleet: Fleet, name: str) -> None:
 
 
 def kill_all(fleet: Fleet, killing: Killing) -> None:
-    """Every service killed as often as it should be, each time at work: not before its moment, nor before it is."""
+    """Every service killed as often as it should be: not before its moment, and after some work of its own."""
     began_s = time.monotonic()
 
     def kill_one(name: str) -> None:
-        pause = threading.Event()
+        pause, die = threading.Event(), Random(f"{killing.seed}/{name}/work")
         for moment_s in killing.moments_s(name):
             pause.wait(max(began_s + moment_s - time.monotonic(), 0.0))
             wait_until(lambda: is_at_work(fleet, name), f"{name} at work", within_s=SETTLE_S)
+            pause.wait(die.uniform(0.0, WORK_MAX_S))
             kill(fleet, name)
 
     with ThreadPoolExecutor(max_workers=len(killing.services)) as pool:

@@ -97,8 +97,8 @@ def events_by_boot(outcome: Outcome, stream: str) -> Iterator[list[tuple[int, Ev
 
 
 def version_faults(outcome: Outcome) -> list[str]:
-    """Where the versions of the map are not one after the other, each upon the one before or whole in itself, and each
-    solved from no less than the one before."""
+    """Where the versions of the map are not one after the other, each whole in itself or upon the one before, of which
+    it then has all that was read."""
     found: list[str] = []
     before, read = 0, dict[str, int]()
     for rows in events_by_boot(outcome, MAPPED_STREAM):
@@ -106,22 +106,23 @@ def version_faults(outcome: Outcome) -> list[str]:
             if head.map_version != before + 1 or head.base_version not in (0, before):
                 found.append(f"version {head.map_version} upon {head.base_version} after version {before}")
             inputs = dict(head.inputs)
-            found += [f"version {head.map_version}: {name} is back" for name in read if inputs[name] < read[name]]
+            if head.base_version:
+                found += [f"version {head.map_version}: {name} is back" for name in read if inputs[name] < read[name]]
             before, read = head.map_version, inputs
     return found
 
 
 def correction_differences(ours: Outcome, theirs: Outcome) -> list[str]:
-    """Where a drive was told its place of a time no later than it was told before, and the drives that were not told
+    """Where a drive was told its place of a time no later than it was told before, and the vehicles that were not told
     of the same time last."""
     found, newest = _corrections(ours)
     _, other = _corrections(theirs)
     alone = newest.items() ^ other.items()
-    return [*found, *(f"{vehicle}/{boot_id}: told of {stamp_ns} ns last" for (vehicle, boot_id), stamp_ns in alone)]
+    return [*found, *(f"{vehicle}: told of {stamp_ns} ns last" for vehicle, stamp_ns in alone)]
 
 
-def _corrections(outcome: Outcome) -> tuple[list[str], dict[tuple[str, str], int]]:
-    """What is out of order, and by drive the newest time in ns it was told its place of."""
+def _corrections(outcome: Outcome) -> tuple[list[str], dict[str, int]]:
+    """What is out of order, and by vehicle the newest time in ns it was told its place of."""
     found, told = [], dict[tuple[str, str], int]()
     for rows in events_by_boot(outcome, ODOMETRY_STREAM):
         for stamp_ns, event in rows:
@@ -130,7 +131,10 @@ def _corrections(outcome: Outcome) -> tuple[list[str], dict[tuple[str, str], int
                 if stamp_ns <= told.get(drive, -1):
                     found.append(f"{drive}: {stamp_ns} ns after {told[drive]} ns")
                 told[drive] = stamp_ns
-    return found, told
+    newest: dict[str, int] = {}
+    for (vehicle, _), stamp_ns in told.items():
+        newest[vehicle] = max(newest.get(vehicle, 0), stamp_ns)
+    return found, newest
 
 
 def final_map(outcome: Outcome) -> Counter[tuple[str, bytes]]:
