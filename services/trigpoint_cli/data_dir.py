@@ -107,6 +107,7 @@ def _directory(context: click.Context, parameter: click.Parameter, value: Path) 
 data_option: Callable[[Any], Any] = click.option(
     "--data",
     required=True,
+    envvar="TRIGPOINT_FLEET__DATA",
     metavar="DIR",
     type=click.Path(path_type=Path),
     callback=_directory,

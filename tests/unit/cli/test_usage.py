@@ -46,6 +46,14 @@ def test_what_is_not_there_is_named_in_one_line_and_ends_with_status_2(
     assert "missing." in said.err or NOTHING in said.err
 
 
+def test_the_data_directory_may_come_from_the_environment_and_a_flag_goes_before_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("TRIGPOINT_FLEET__DATA", "from-the-environment")
+    assert "from-the-environment: no such data directory" in trigpoint("drives", "list").err
+    assert f"{NOTHING}: no such data directory" in trigpoint("drives", "list", "--data", NOTHING).err
+
+
 def test_nothing_is_made_for_a_command_that_only_reads(tmp_path: Path) -> None:
     trigpoint("build", "--data", tmp_path / NOTHING)
     trigpoint("landmarks", "--data", tmp_path / NOTHING)
