@@ -170,6 +170,7 @@ def test_a_landmark_both_named_and_removed_is_removed() -> None:
 
 places_m = st.floats(-20_000.0, 20_000.0)
 variances_m2 = st.floats(1e-6, 100.0)
+any_observations = st.lists(st.tuples(st.text(max_size=3), st.just("boot-1"), st.integers()), max_size=3).map(tuple)
 
 
 @st.composite
@@ -181,7 +182,7 @@ def any_landmark(draw: st.DrawFn) -> LandmarkSolved:
         solved_landmark(draw(st.text(max_size=4)), draw(places_m), draw(places_m)),
         covariance_m2=np.array([[east_m2, shared_m2], [shared_m2, north_m2]]),
         anchors=draw(st.lists(st.text(max_size=3), max_size=2).map(tuple)),
-        observations=draw(st.lists(st.tuples(st.text(max_size=3), st.just("boot-1"), st.integers()), max_size=3)),
+        observations=draw(any_observations),
     )
 
 
