@@ -12,7 +12,7 @@ from fleet_runs.running import fleet_of
 from landmark_databases.cluster import Cluster
 
 SOAK_S = float(os.environ.get("SOAK_S", "1800"))  # of the long one; its last two thirds are held flat
-HANDLES = 4  # a rotated file is open beside its successor, a request beside the endpoint
+HANDLES = 8  # a rotated file beside its successor, a request beside the endpoint, the pipes to a solving process
 
 
 def grown(footprints: list[Footprint], share: float) -> tuple[float, float]:
