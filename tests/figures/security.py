@@ -9,10 +9,10 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
-from command_runs.processes import fleet_in, trigpoint_process
+from command_runs.processes import comes_true, fleet_in, trigpoint_process
 from figures.figure import Figure, Measurement, at_least, at_most
 from figures.workbench import CommandFailed, Workbench
-from secured_fleet.fleet import SecuredFleet, authority_of, comes_true, files_of, message, secured_fleet
+from secured_fleet.fleet import SecuredFleet, authority_of, files_of, message, secured_fleet
 from trigpoint.bus.ports import BusMessage
 from trigpoint.bus.register import Role
 from trigpoint.bus.tls import TlsFiles

@@ -2,12 +2,12 @@
 
 import re
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from command_runs.processes import LOOK_S, Fleet, Process, free_ports, trigpoint_process
+from command_runs.processes import Fleet, Process, comes_true, free_ports, trigpoint_process
 from trigpoint.bus.ports import BusMessage
 from trigpoint.bus.register import REGISTER_NAME, Role
 from trigpoint.bus.tls import TlsFiles
@@ -57,16 +57,6 @@ def tls_lines(files: TlsFiles) -> str:
         f'certificate_file = "{files.certificate_file}"\n'
         f'key_file = "{files.key_file}"\n'
     )
-
-
-def comes_true(condition: Callable[[], bool], *, within_s: float = 30.0) -> bool:
-    """Whether a condition holds now or soon: loopback takes milliseconds, the rest is a slow machine's share."""
-    end_s = time.monotonic() + within_s
-    while not condition():
-        if time.monotonic() > end_s:
-            return False
-        time.sleep(LOOK_S)
-    return True
 
 
 @dataclass(frozen=True, slots=True)

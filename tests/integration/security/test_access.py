@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from command_runs.processes import CLEAN
-from secured_fleet.fleet import DAY_S, SecuredFleet, authority_of, comes_true, files_of, message, secured_fleet
+from command_runs.processes import CLEAN, comes_true
+from secured_fleet.fleet import DAY_S, SecuredFleet, authority_of, files_of, message, secured_fleet
 from trigpoint.bus.ports import Subscription
 from trigpoint.bus.register import Role
 from trigpoint.bus.zenoh_bus import ZenohBus, ZenohSettings

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from command_runs.processes import Process, trigpoint_process
-from secured_fleet.fleet import SecuredFleet, comes_true, message, secured_fleet
+from command_runs.processes import Process, comes_true, trigpoint_process
+from secured_fleet.fleet import SecuredFleet, message, secured_fleet
 from trigpoint.bus.attachment import encode_attachment
 from trigpoint.bus.ports import BusMessage
 from trigpoint.errors import InputError

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from command_runs.processes import trigpoint_process
-from secured_fleet.fleet import SecuredFleet, comes_true, files_of, secured_fleet
+from command_runs.processes import comes_true, trigpoint_process
+from secured_fleet.fleet import SecuredFleet, files_of, secured_fleet
 from trigpoint.bus.register import Role
 from trigpoint.events.observed import GnssFixReceived, ImuMeasured, VehicleDescribed
 from trigpoint_vehicle.publisher import VehiclePublisher

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from command_runs.processes import Process, free_ports, trigpoint_process
-from secured_fleet.fleet import SecuredFleet, comes_true, files_of, message, secured_fleet
+from command_runs.processes import Process, comes_true, free_ports, trigpoint_process
+from secured_fleet.fleet import SecuredFleet, files_of, message, secured_fleet
 from trigpoint.bus.register import Role
 from trigpoint.bus.zenoh_bus import ZenohBus
 
