@@ -199,6 +199,11 @@ class LiveOptimisation:
         if self._fleet is None or now_s < self._told_s + self._settings.live.version_interval_s:
             return False
         self._told_s = now_s
+        return self._tell_changed()
+
+    def _tell_changed(self) -> bool:
+        assert self._fleet is not None, "begun before"
+        began_s = time.monotonic()
         changed = self._fleet.map.changed_landmarks(share=self._settings.live.moved_share)
         if changed:
             head = MapSolved(
@@ -208,7 +213,7 @@ class LiveOptimisation:
                 inputs=self._positions(),
                 landmark_count=self._fleet.map.told_count,
                 anchor_count=self._anchor_count,
-                wall_s=time.monotonic() - now_s,
+                wall_s=time.monotonic() - began_s,
                 base_version=self._version,
             )
             self._append_version((*changed, head), stamp_ns=self._newest_ns)
@@ -272,6 +277,13 @@ class LiveOptimisation:
             return f"no news for {live.settle_s:g} s"
         return ""
 
+    def _begin_again(self) -> None:
+        """As after a restart, once all is told: memory is bounded also where no whole solve comes."""
+        while self._tell_changed():
+            pass
+        logger.warning("the graph begins anew from the newest version", extra={"map_version": self._version})
+        self._fleet = None
+
     def _take_whole(self, found: WholeSolve) -> None:
         """The map as a whole solve has it, and from there on what came since."""
         assert self._fleet is not None, "begun before"
@@ -282,6 +294,8 @@ class LiveOptimisation:
         if found.refusal:
             logger.warning("the whole map cannot be solved: %s", found.refusal)
             self._correction_s = time.monotonic() + self._settings.live.solve_interval_s  # with more data perhaps
+            if self._fleet.map.pose_count > self._settings.live.pose_limit:
+                self._begin_again()
             return
         self._append_version(found.events, stamp_ns=found.stamp_ns)
         self._solved_inputs = found.inputs

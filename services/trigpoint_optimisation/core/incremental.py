@@ -138,9 +138,9 @@ class IncrementalGraph:
         self._guesses.insert(key, pose[:2] + turn @ arm)
 
     def update(
-        self, *, newest: tuple[int, int] | None = None, near: Iterable[int] = (), nearer: Iterable[int] = ()
+        self, *, keyframe: tuple[int, int] | None = None, near: Iterable[int] = (), nearer: Iterable[int] = ()
     ) -> None:
-        """Everything added is solved for. The `newest` keyframe of a drive and landmarks `near` it stay at the root of
+        """Everything added is solved for. A drive's `keyframe` and landmarks `near` it stay at the root of
         the solver's tree where the update touches them, and `nearer` ones are brought there: their covariances will be
         asked for, and come ten times as soon from there. None of what was added may hold by these alone: an order
         that leaves nothing to be eliminated before them has no end. Raises ServiceError where it leaves a state
@@ -148,8 +148,8 @@ class IncrementalGraph:
         if not (self._factors.size() or self._guesses.size()):
             return
         last, raised = gtsam.KeyGroupMap(), gtsam.KeyList()
-        if newest is not None:
-            last.insert2(pose_key(*newest), LAST)
+        if keyframe is not None:
+            last.insert2(pose_key(*keyframe), LAST)
         for key in map(landmark_key, near):
             last.insert2(key, LAST)
         for key in map(landmark_key, nearer):

@@ -34,7 +34,7 @@ OPEN_M = 150.0  # of path after which a track that nothing decided is let go
 VOTED_EVERY_M = 10.0  # of path
 REACH_M = 12.0  # around where a track lies, within which landmarks may be its own
 CANDIDATES_MOST = 4  # of them, the nearest
-LOOKS_MOST = 3  # legs of which an update takes in what was seen: hundreds wait once a drive has found its place
+LOOKS_MOST = 2  # legs of which an update takes in what was seen: hundreds wait once a drive has found its place
 TOLD_MOST = 60  # landmarks in a version: their covariances are what it takes longest for
 RETRIED_EVERY = 5  # keyframes: a track that nothing decides
 FOLLOWED_SIGMA_M = 0.15  # between a vehicle and a landmark it has in sight
@@ -136,9 +136,7 @@ class LiveMap:
             self._refresh(near)
             drive.near = frozenset(near)
             self._look(drive, leg)
-            assert drive.newest is not None, "it has moved"
-            newest = drive.index, drive.newest.keyframe + 1
-            self._graph.update(newest=newest, near=near, nearer=sorted(drive.near - before))
+            self._graph.update(keyframe=(drive.index, leg.keyframe + 1), near=near, nearer=sorted(drive.near - before))
 
     def place(self, name: DriveName) -> DrivePlace:
         """Where a placed drive is."""

@@ -6,6 +6,7 @@ from contextlib import closing
 from functools import cache
 
 import numpy as np
+import pytest
 
 from solved_worlds.examples import FRAME, Lap, World, world
 from solved_worlds.logged import all_accepted
@@ -27,7 +28,7 @@ from trigpoint.logs.readings import logged_maps
 from trigpoint.observability.metrics import Instruments
 from trigpoint_optimisation.live import BATCH, LiveOptimisation
 from trigpoint_optimisation.settings import LiveSettings, SolveSettings
-from trigpoint_optimisation.whole_solve import SolverInPlace
+from trigpoint_optimisation.whole_solve import SolverInPlace, WholeSolve
 
 NEVER_S = 1e9
 EAGER = SolveSettings(live=LiveSettings(version_interval_s=0.0, settle_s=NEVER_S, solve_interval_s=NEVER_S))
@@ -211,6 +212,29 @@ def test_the_whole_map_is_solved_once_no_news_comes() -> None:
     service.close()
     assert newest(log).head.base_version == 0
     assert newest(log).trajectories[0].vehicle == "car"
+
+
+class RefusingSolver(SolverInPlace):
+    """One that never finds a map."""
+
+    def result(self) -> WholeSolve:
+        self.busy = False
+        return WholeSolve(inputs=(), refusal="in a test")
+
+
+def test_where_no_whole_map_can_be_solved_a_full_graph_begins_anew_from_the_newest_version(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    log, rows = pinned(), car_rows()
+    live = LiveSettings(version_interval_s=0.0, settle_s=NEVER_S, solve_interval_s=0.0, pose_limit=100)
+    settings = SolveSettings(live=live)
+    log.append("filtering", accepted(rows))
+    log.append("veh-car", rows)
+    with closing(LiveOptimisation(log, RefusingSolver(log, settings), settings=settings)) as service:
+        while service.step():
+            pass
+    assert "the graph begins anew from the newest version" in caplog.text
+    assert len(newest(log).landmarks) >= 36
 
 
 def newest_method(log: MemoryLog) -> str:
