@@ -5,7 +5,7 @@ thousands of factors and an update stays short.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import gtsam
 import numpy as np
@@ -24,7 +24,6 @@ RELINEARISE_EVERY = 10  # updates between two looks at which moved more
 WILDFIRE = 0.003  # changes smaller than this, in m and rad, are not passed on through the graph
 ARM_SIGMA_M, ARM_SIGMA_RAD = 0.02, 0.01  # of the antenna on its keyframe
 ARM_LEAST_M = 0.5  # a shorter arm has no usable bearing
-LAST = 1  # group of what is eliminated last, which makes it the root; what is in no group goes before
 DATUM_SHARE = 0.9  # of the best-known landmark's variance is common to all: none is surer than what they share
 
 
@@ -137,26 +136,12 @@ class IncrementalGraph:
         self._factors.add(gtsam.BetweenFactorPoint2(fix_bias_key(drive, knot), key, fix_m, white))
         self._guesses.insert(key, pose[:2] + turn @ arm)
 
-    def update(
-        self, *, keyframe: tuple[int, int] | None = None, near: Iterable[int] = (), nearer: Iterable[int] = ()
-    ) -> None:
-        """Everything added is solved for. A drive's `keyframe` and landmarks `near` it stay at the root of
-        the solver's tree where the update touches them, and `nearer` ones are brought there: their covariances will be
-        asked for, and come ten times as soon from there. None of what was added may hold by these alone: an order
-        that leaves nothing to be eliminated before them has no end. Raises ServiceError where it leaves a state
-        undetermined."""
+    def update(self) -> None:
+        """Everything added is solved for. Raises ServiceError where it leaves a state undetermined."""
         if not (self._factors.size() or self._guesses.size()):
             return
-        last, raised = gtsam.KeyGroupMap(), gtsam.KeyList()
-        if keyframe is not None:
-            last.insert2(pose_key(*keyframe), LAST)
-        for key in map(landmark_key, near):
-            last.insert2(key, LAST)
-        for key in map(landmark_key, nearer):
-            if not self._guesses.exists(key):
-                raised.push_back(key)
         try:
-            self._solver.update(self._factors, self._guesses, [], last if last.size() else None, None, raised)
+            self._solver.update(self._factors, self._guesses)
         except RuntimeError as error:  # gtsam names the state, not the cause; a restart begins from the last version
             raise ServiceError(f"{self.pose_count} poses cannot be solved for: {error}") from error
         self._factors, self._guesses = gtsam.NonlinearFactorGraph(), gtsam.Values()

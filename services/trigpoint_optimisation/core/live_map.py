@@ -130,13 +130,11 @@ class LiveMap:
     def _look_on(self, drive: DriveInMap) -> None:
         """The oldest legs that were not looked at, so few that an update stays short."""
         for _ in range(min(LOOKS_MOST, len(drive.unseen))):
-            leg, before = drive.unseen.popleft(), drive.near
+            leg = drive.unseen.popleft()
             at_m = self._graph.pose(drive.index, leg.keyframe)[:2]
-            near = self._known.within(at_m, self._settings.detections.max_range_m).tolist()
-            self._refresh(near)
-            drive.near = frozenset(near)
+            self._refresh(self._known.within(at_m, self._settings.detections.max_range_m + REACH_M))
             self._look(drive, leg)
-            self._graph.update(keyframe=(drive.index, leg.keyframe + 1), near=near, nearer=sorted(drive.near - before))
+            self._graph.update()
 
     def place(self, name: DriveName) -> DrivePlace:
         """Where a placed drive is."""

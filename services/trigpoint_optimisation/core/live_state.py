@@ -30,14 +30,13 @@ class DrivePlace:
 @dataclass(slots=True)
 class DriveInMap:
     """One drive's part in the map. `waiting`: legs that have no place yet; `unseen`: legs in the graph whose tracks are
-    to be looked at yet; `near`: the landmarks around where it looked last; `of`: the landmark of each track."""
+    to be looked at yet; `of`: the landmark of each track."""
 
     index: int
     described: VehicleDescribed
     boot_id: str
     waiting: list[Leg] = field(default_factory=list)
     unseen: deque[Leg] = field(default_factory=deque)
-    near: frozenset[int] = frozenset()
     fixes: dict[int, LocalFix] = field(default_factory=dict)
     hung: dict[int, tuple[int, HungFix]] = field(default_factory=dict)
     pending: dict[int, Track] = field(default_factory=dict)
