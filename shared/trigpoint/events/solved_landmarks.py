@@ -19,7 +19,7 @@ MeaningT = TypeVar("MeaningT")
 Names = tuple[str, ...]
 Observations = tuple[tuple[str, str, int], ...]
 
-KNOWN_BYTES = 4 * 1024 * 1024  # of texts whose meaning is kept; what is kept takes some times that
+KNOWN_BYTES = 256 * 1024  # of texts whose meaning is kept; what is kept takes some ten times that
 SCHEMA = schema_name(LandmarkSolved)
 FIELD = mapped_pb2.LandmarkSolved.DESCRIPTOR.fields_by_name
 VARINT, FIXED64, LENGTH = 0, 1, 2  # wire types (protobuf.dev, Encoding)
