@@ -19,7 +19,8 @@ MeaningT = TypeVar("MeaningT")
 Names = tuple[str, ...]
 Observations = tuple[tuple[str, str, int], ...]
 
-KNOWN_BYTES = 256 * 1024  # of texts whose meaning is kept; what is kept takes some ten times that
+NAMES_BYTES = 4 * 1024 * 1024  # of names kept: they come again with every version
+KNOWN_BYTES = 256 * 1024  # of other texts whose meaning is kept; what is kept takes some ten times that
 SCHEMA = schema_name(LandmarkSolved)
 FIELD = mapped_pb2.LandmarkSolved.DESCRIPTOR.fields_by_name
 VARINT, FIXED64, LENGTH = 0, 1, 2  # wire types (protobuf.dev, Encoding)
@@ -90,9 +91,9 @@ class LandmarkDecoder:
     """Decodes payloads of LandmarkSolved, many at once; it remembers what texts meant that come again and again."""
 
     def __init__(self) -> None:
-        self._names = _Known(_names_of)
-        self._vehicles = _Known(_vehicles_of)
-        self._seen = _Known(_seen_of)
+        self._names = _Known(_names_of, limit_bytes=NAMES_BYTES)
+        self._vehicles = _Known(_vehicles_of, limit_bytes=KNOWN_BYTES)
+        self._seen = _Known(_seen_of, limit_bytes=KNOWN_BYTES)
 
     def decoded(self, payloads: Sequence[bytes]) -> SolvedLandmarks:
         """The landmarks of the payloads, each as the codec decodes it. Raises EventRejected as it does."""
@@ -156,8 +157,8 @@ def _joined(first: SolvedLandmarks, second: SolvedLandmarks) -> SolvedLandmarks:
 class _Known(Generic[MeaningT]):
     """What parts of payloads mean: looked up where it is known, worked out where it is not; None for no meaning."""
 
-    def __init__(self, meaning: Callable[[bytes], MeaningT | None]) -> None:
-        self._meaning = meaning
+    def __init__(self, meaning: Callable[[bytes], MeaningT | None], *, limit_bytes: int) -> None:
+        self._meaning, self._limit_bytes = meaning, limit_bytes
         self._known: dict[bytes, MeaningT] = {}
         self._bytes = 0
 
@@ -171,7 +172,7 @@ class _Known(Generic[MeaningT]):
     def _learnt(self, part: bytes) -> MeaningT | None:
         found = self._known.get(part) or self._meaning(part)
         if found is not None and part not in self._known:
-            if self._bytes > KNOWN_BYTES:
+            if self._bytes > self._limit_bytes:
                 self._known, self._bytes = {}, 0
             self._known[part] = found
             self._bytes += len(part)
