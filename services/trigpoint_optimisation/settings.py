@@ -164,7 +164,7 @@ class LiveSettings:
     settle_s: float = 10.0  # after so long without news the whole map is solved
     solve_interval_s: float = 120.0  # between two whole solves that only doubt asks for
     correction_delay_s: float = 1.0  # labels come in crowds: the last one is waited for
-    pose_limit: int = 20_000  # in the growing graph: beyond, the whole map is solved and the graph begins anew; where
+    pose_limit: int = 5_000  # in the growing graph: beyond, the whole map is solved and the graph begins anew; where
     # that is refused, from the newest version
     solver_niceness: int = 10  # of the process that solves the whole map: updates go first
 

@@ -12,6 +12,7 @@ from trigpoint.events.envelope import Envelope
 from trigpoint.events.estimated import FixJudged
 from trigpoint.events.mapped import LandmarkSolved
 from trigpoint.events.observed import GnssFixReceived, Observed
+from trigpoint.events.solved import SolvedMap
 from trigpoint.geodesy.projection import map_points_from_wgs84
 from trigpoint_optimisation.core.live_fleet import LiveFleet
 from trigpoint_optimisation.core.live_state import DrivePlace
@@ -26,9 +27,12 @@ Rows = Sequence[Envelope[Observed]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UpdateTimes:
-    """99th percentiles of the updates from so many poses in the map on: by the clock, and of the processor."""
+    """99th percentiles of the updates from so many poses in the map on: by the clock, and of the processor; how many
+    poses the map had in the end and the growing graph at most, and how often the whole map was solved."""
 
     poses: int
+    growing_most: int
+    solves: int
     p99_ms: float
     p99_processor_ms: float
 
@@ -68,22 +72,67 @@ def accepted_fixes(campus: Campus, index: int) -> list[FixJudged]:
 
 
 def update_times(*, vehicles: int, poses: int, seed: int = 1) -> UpdateTimes:
-    """How long updates take once the map has `poses`, drive after drive, with no whole solve in between."""
+    """How long updates take once the map has `poses`, drive after drive.
+
+    As in the service the whole map is solved when the growing graph is beyond its limit, and taken in once that solve
+    would be done: after as much time of the drive as it took.
+    """
     campus = simulate_campus(seed, CampusSettings(vehicles=vehicles))
+    solving = _Solving(campus, SolveSettings())
     fleet = LiveFleet(campus.frame, SolveSettings())
     wall, processor = [], []
+    driven = most = 0  # keyframes of all drives; of the growing graph
     for index, recording in enumerate(campus.recordings):
         verdicts = {verdict.fix_sequence: verdict for verdict in accepted_fixes(campus, index)}
-        for row in recording.rows:
+        for count, row in enumerate(recording.rows, start=1):
             began_s, began_processor_s = time.perf_counter(), time.thread_time()
             places = fleet.take(row)
             if row.identity.sequence in verdicts:
                 fleet.judged(verdicts[row.identity.sequence])
-            if places and fleet.map.pose_count >= poses:
+            driven += len(places)
+            if places and driven >= poses:
                 wall.append(time.perf_counter() - began_s)
                 processor.append(time.thread_time() - began_processor_s)
-    p99 = (1e3 * float(np.percentile(each, 99)) if each else math.nan for each in (wall, processor))
-    return UpdateTimes(poses=fleet.map.pose_count, p99_ms=next(p99), p99_processor_ms=next(p99))
+            most = max(most, fleet.map.pose_count)
+            if places:
+                solving.look(fleet, drive=index, rows=count, stamp_ns=row.stamp_ns)
+    p99_ms, p99_processor_ms = (
+        1e3 * float(np.percentile(each, 99)) if each else math.nan for each in (wall, processor)
+    )
+    return UpdateTimes(
+        poses=driven,
+        growing_most=most,
+        solves=solving.count,
+        p99_ms=p99_ms,
+        p99_processor_ms=p99_processor_ms,
+    )
+
+
+class _Solving:
+    """Whole solves as the service asks for them, each taken in when it would be done."""
+
+    def __init__(self, campus: Campus, settings: SolveSettings) -> None:
+        self._campus, self._settings = campus, settings
+        self._solved: SolvedMap | None = None
+        self._due_ns = 0
+        self.count = 0  # of the solves taken in
+
+    def look(self, fleet: LiveFleet, *, drive: int, rows: int, stamp_ns: int) -> None:
+        """A solve begun of what came so far, `rows` of this drive's, or the one under way taken in if it is due."""
+        if self._solved is not None and stamp_ns >= self._due_ns:
+            solved, self._solved = self._solved, None
+            self.count += 1
+            fleet.begin_anew(solved.landmarks, solved.trajectories, excluded=())
+        elif self._solved is None and fleet.map.pose_count > self._settings.live.pose_limit:
+            began_s = time.perf_counter()
+            self._solved = self._whole(drive, rows)
+            self._due_ns = stamp_ns + round((time.perf_counter() - began_s) * 1e9)
+
+    def _whole(self, drive: int, rows: int) -> SolvedMap:
+        recordings = self._campus.recordings
+        so_far = [row for one in recordings[:drive] for row in one.rows] + list(recordings[drive].rows[:rows])
+        verdicts = [one for index in range(drive + 1) for one in accepted_fixes(self._campus, index)]
+        return solve_map(drives_of(so_far), (), self._campus.frame, self._settings, verdicts=verdicts).map
 
 
 def solved_base(campus: Campus, index: int) -> tuple[LandmarkSolved, ...]:

@@ -22,6 +22,7 @@ from trigpoint.landmarks.model import (
     MapChange,
     MapVersion,
     Trajectory,
+    joined_provenance,
     provenance_json,
 )
 from trigpoint_landmarks.core.versions import SolvedVersion
@@ -50,7 +51,10 @@ def map_change(version: SolvedVersion, *, frame: MapFrame, labels: Labels, valid
     version that is a change of the one before, landmarks it does not name keep theirs too.
     """
     removed = frozenset(version.solved.removed) if version.solved.base_version else frozenset()
-    solved = {row.landmark: row for row in landmark_rows(_without(version.landmarks, removed), frame)}
+    rows = landmark_rows(_without(version.landmarks, removed), frame)
+    if version.solved.base_version:
+        rows = [_seen_more(valid.get(row.landmark), row) for row in rows]
+    solved = {row.landmark: row for row in rows}
     kept = {name for name, row in solved.items() if name in valid and _is_same(valid[name], row)}
     gone: Iterable[str] = (*solved, *removed) if version.solved.base_version else valid
     return MapChange(
@@ -97,6 +101,13 @@ def landmark_rows(solved: SolvedLandmarks, frame: MapFrame) -> list[Landmark]:
         strict=False,
     )
     return list(map(Landmark._make, rows))
+
+
+def _seen_more(before: Landmark | None, row: Landmark) -> Landmark:
+    """The row of a version upon another, which has the observations since, with those before."""
+    if before is None or before.provenance == row.provenance:
+        return row
+    return row._replace(provenance=joined_provenance(before.provenance, row.provenance))
 
 
 def _without(solved: SolvedLandmarks, removed: frozenset[str]) -> SolvedLandmarks:

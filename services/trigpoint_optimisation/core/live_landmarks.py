@@ -19,7 +19,7 @@ UNNUMBERED = 0  # a map version until the log gives it its number
 
 @dataclass(slots=True)
 class LiveLandmark:
-    """One landmark: its name, what it is, and every sweep that saw it."""
+    """One landmark: its name, what it is, and every sweep that saw it since it was told of."""
 
     name: str
     kind: str
@@ -68,7 +68,6 @@ def landmark_of(event: LandmarkSolved) -> LiveLandmark:
         first_ns=event.first_seen_ns,
         last_ns=event.last_seen_ns,
         anchors=event.anchors,
-        observations=dict.fromkeys(event.observations),
     )
 
 
@@ -135,6 +134,7 @@ class LiveLandmarks:
         return event
 
     def _say(self, number: int, event: LandmarkSolved) -> None:
+        self.all[number].observations.clear()
         self._said_m[number], self._said_m2[number] = event.position_m, event.covariance_m2
 
     def within(self, at_m: Floats, reach_m: float) -> Ints:

@@ -50,7 +50,8 @@ class LandmarkSolved:
     """One landmark of a map version. position (2,): x, y in m, map frame; covariance (2, 2) in m^2.
 
     `landmark` is stable between versions. `observations` are where its detections stand: (vehicle, boot_id,
-    sequence of the sweep). `anchors` are the labels tied to it.
+    sequence of the sweep); in a version upon another (`MapSolved.base_version`) those since it, which come on top of
+    those before. `anchors` are the labels tied to it.
     """
 
     map_version: int

@@ -1,7 +1,7 @@
 """One whole map version as a value: what the optimiser returns, and what a log's mapped events fold back into."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,7 +102,8 @@ def solved_maps(events: Iterable[Mapped]) -> tuple[SolvedMap, ...]:
 def _upon(base: SolvedMap, change: SolvedMap) -> SolvedMap:
     """A version that says only what differs from its base, made whole with what the base has."""
     paths = {(one.vehicle, one.boot_id): one for one in (*base.trajectories, *change.trajectories)}
-    landmarks = {one.landmark: one for one in (*base.landmarks, *change.landmarks)}
+    landmarks = {one.landmark: one for one in base.landmarks}
+    landmarks |= {one.landmark: seen_more(landmarks.get(one.landmark), one) for one in change.landmarks}
     removed = set(change.head.removed)
     return SolvedMap(
         head=change.head,
@@ -111,6 +112,13 @@ def _upon(base: SolvedMap, change: SolvedMap) -> SolvedMap:
         anchors=tuple({(one.anchor, one.image): one for one in (*base.anchors, *change.anchors)}.values()),
         images=tuple({one.image: one for one in (*base.images, *change.images)}.values()),
     )
+
+
+def seen_more(before: LandmarkSolved | None, landmark: LandmarkSolved) -> LandmarkSolved:
+    """A landmark of a version upon another, which has the observations since, with those before."""
+    if before is None:
+        return landmark
+    return replace(landmark, observations=tuple(dict.fromkeys((*before.observations, *landmark.observations))))
 
 
 def _assembled(head: MapSolved, parts: list[Mapped]) -> SolvedMap:

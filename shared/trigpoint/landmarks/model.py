@@ -200,6 +200,16 @@ def provenance_json(observations: Sequence[tuple[str, str, int]]) -> str:
     return "{" + ", ".join(f"{_drive_json(drive)}: {sequences}" for drive, sequences in by_drive.items()) + "}"
 
 
+def joined_provenance(before: str, since: str) -> str:
+    """The text of observations (as `provenance_json`) and of those since, each once."""
+    if before == since or since == "{}":
+        return before
+    joined: dict[str, list[int]] = json.loads(before)
+    for drive, sequences in json.loads(since).items():
+        joined[drive] = list(dict.fromkeys((*joined.get(drive, ()), *sequences)))
+    return "{" + ", ".join(f"{json.dumps(drive, ensure_ascii=False)}: {each}" for drive, each in joined.items()) + "}"
+
+
 @lru_cache(maxsize=4096)
 def _drive_json(drive: tuple[str, str]) -> str:
     return json.dumps("/".join(drive), ensure_ascii=False)

@@ -162,6 +162,23 @@ def test_a_landmark_said_again_just_as_it_was_keeps_its_row() -> None:
     assert (second.opened, second.closed) == ((), ())
 
 
+def test_what_saw_a_landmark_since_comes_on_top_of_what_saw_it_before() -> None:
+    seen = replace(solved_landmark("L1", 1.0, 0.0), observations=(("veh-a", "boot-1", 3), ("veh-b", "boot-2", 1)))
+    again = replace(
+        solved_landmark("L1", 2.0, 0.0, map_version=2), observations=(("veh-a", "boot-1", 3), ("veh-a", "boot-1", 7))
+    )
+    (row,) = delta(2, [again], removed=(), held=changed(1, [seen])).opened
+    assert row.provenance == '{"veh-a/boot-1": [3, 7], "veh-b/boot-2": [1]}'
+
+
+def test_a_whole_version_says_everything_that_saw_a_landmark() -> None:
+    seen = replace(solved_landmark("L1", 1.0, 0.0), observations=(("veh-a", "boot-1", 3),))
+    again = replace(solved_landmark("L1", 2.0, 0.0, map_version=2), observations=(("veh-a", "boot-1", 7),))
+    (version,) = solved_versions(logged([again, closing(2, 1)]))
+    change = map_change(version, frame=frame(), labels={}, valid=valid_with(changed(1, [seen])))
+    assert [row.provenance for row in change.opened] == ['{"veh-a/boot-1": [7]}']
+
+
 def test_a_landmark_both_named_and_removed_is_removed() -> None:
     first = changed(1, [solved_landmark("L1", 1.0, 0.0)])
     second = delta(2, [solved_landmark("L1", 2.0, 0.0, map_version=2)], removed=("L1", "never there"), held=first)

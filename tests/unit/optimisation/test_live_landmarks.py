@@ -1,8 +1,12 @@
 """The landmarks of a live map: found by place and by signature, told of when they are new, moved or known better."""
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 
 from trigpoint_optimisation.core.live_landmarks import LiveLandmarks
+from trigpoint_optimisation.core.live_tracks import Seen, Track
 
 
 def poles(*east_m: float) -> LiveLandmarks:
@@ -53,3 +57,20 @@ def test_only_a_third_less_variance_is_worth_telling() -> None:
     known = poles(0.0)
     known.told(0, np.eye(2))
     assert (known.is_surer(0, 0.8 * np.eye(2)), known.is_surer(0, 0.6 * np.eye(2))) == (False, True)
+
+
+def test_of_what_saw_a_landmark_only_what_is_new_is_told_and_all_of_it_is_counted() -> None:
+    known = poles(0.0)
+    see(known, 3, 4)
+    first = known.told(0, np.eye(2))
+    see(known, 5)
+    second = known.told(0, np.eye(2))
+    assert [sequence for _, _, sequence in first.observations] == [3, 4]
+    assert ([sequence for _, _, sequence in second.observations], second.observation_count) == ([5], 3)
+
+
+def see(known: LiveLandmarks, *sequences: int) -> None:
+    """The first landmark seen in sweeps of these numbers."""
+    track = cast(Track, SimpleNamespace(first_ns=0, last_ns=1))
+    seen = [cast(Seen, SimpleNamespace(sequence=sequence)) for sequence in sequences]
+    known.all[0].take(track, seen, vehicle="veh-a", boot_id="boot-1")
