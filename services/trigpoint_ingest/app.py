@@ -4,7 +4,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from types import TracebackType
 from typing import Self
 
@@ -20,6 +20,7 @@ from trigpoint_ingest.reception import Reception
 from trigpoint_ingest.settings import IngestSettings
 
 IDLE_S = 0.002  # between two looks at an empty queue: waiting for each message costs more than the message
+ALONE_S, ALONE_COUNT = 0.02, 4096  # a group under way has the interpreter to itself so long, if no more messages wait
 CLAIM_LOOK_S = 1.0  # between two looks at others' claims
 
 logger = logging.getLogger(__name__)
@@ -28,8 +29,8 @@ logger = logging.getLogger(__name__)
 class IngestService:
     """Hears its vehicles on the bus: order restored, validated, appended in groups, published, acknowledged.
 
-    While a group is made durable the next one is gathered. Close it (or leave its `with`): what was admitted is then
-    in the log.
+    While a group is made durable the next one is gathered, if there is much to gather. Close it (or leave its `with`):
+    what was admitted is then in the log.
     """
 
     def __init__(
@@ -108,7 +109,9 @@ class IngestService:
     def _is_due(self, now_s: float) -> bool:
         journal, settings = self._journal, self._settings
         waiting = journal.pending_count + self._reception.arrived
-        if waiting >= settings.live_batch_count or journal.pending_bytes >= settings.batch_bytes:
+        if waiting >= ALONE_COUNT or journal.pending_bytes >= settings.batch_bytes:
+            return True
+        if waiting >= settings.live_batch_count and not self._reception.waiting:  # else what is there goes along
             return True
         return now_s - self._sealed_s >= self._settings.batch_s and self._has_work()
 
@@ -125,6 +128,8 @@ class IngestService:
     def _begin(self, group: Group) -> None:
         self._group, self._begun_s = group, self._now_s()
         self._committing = self._committer.submit(self._journal.commit, group)
+        if self._reception.waiting <= ALONE_COUNT:  # two threads that take turns at every write need longer for both
+            wait((self._committing,), timeout=ALONE_S)
 
     def _finish(self) -> None:
         """The end of the group under way. Raises what ended it, unless it is to be tried again."""
