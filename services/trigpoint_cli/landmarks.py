@@ -5,12 +5,12 @@ import json
 import click
 
 from trigpoint.errors import InputError
+from trigpoint.landmarks.geojson import feature_collection, landmark_list
 from trigpoint.landmarks.queries import LandmarkQuery
 from trigpoint_cli.data_dir import DataDirectory, as_of_option, data_option
 from trigpoint_cli.database import database_options
 from trigpoint_cli.output import Answer, Screen, answering, plain
 from trigpoint_landmarks.core.questions import bbox_of, near_of
-from trigpoint_landmarks.core.rendering import feature_collection, landmark_list
 
 
 @click.command("landmarks")
