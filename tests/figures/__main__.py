@@ -19,6 +19,7 @@ from figures import (
     mrclam,
     nclt,
     projection,
+    relocalise,
     security,
     security_fuzz,
     victoria_park,
@@ -41,6 +42,7 @@ GROUPS: Mapping[str, Sequence[Figure]] = {
     ),
     "ingest": (*ingest.FIGURES, *projection.FIGURES),
     "live": live.FIGURES,
+    "relocalise": relocalise.FIGURES,
     "security": (*security.FIGURES, *security_fuzz.FIGURES),
 }
 PROGRAM = (str(Path(sys.executable).with_name("trigpoint")),)

@@ -187,20 +187,21 @@ def trial_findings(
     expected = expected_of(settings)
     for place in places:
         found = find(place.observed, known, place.prior, expected)
-        yield _finding(found, place)
+        yield finding_at(found, place.pose, map_error_m=place.map_error_m)
 
 
-def _finding(found: Relocalised | None, place: Place) -> Finding:
+def finding_at(found: Relocalised | None, pose: Floats, *, map_error_m: Floats) -> Finding:
+    """What came of looking for a true pose (3,) where the map is off by map_error_m (2,)."""
     if found is None:
         return Finding(
             verdict=None, error_m=math.nan, error_in_map_m=math.nan, error_rad=math.nan, nees_per_dof=math.nan
         )
-    off = found.T_map_base - place.pose
+    off = found.T_map_base - pose
     off[2] = wrap_angle_rad(float(off[2]))
     return Finding(
         verdict=found.verdict,
         error_m=float(np.hypot(off[0], off[1])),
-        error_in_map_m=float(np.hypot(*(off[:2] - place.map_error_m))),
+        error_in_map_m=float(np.hypot(*(off[:2] - map_error_m))),
         error_rad=abs(float(off[2])),
         nees_per_dof=float(off @ np.linalg.solve(found.covariance, off)) / 3.0,
     )

@@ -25,6 +25,7 @@ REACH = 4.0  # sigmas of the prior within which places are looked for
 RISK_LIMIT = 1e-4  # probability of being elsewhere or nowhere, with which an answer is still given
 MATCHED_LEAST = 4  # landmarks an answer rests on
 MATCHED_SHARE = 0.5  # of the landmarks observed, at least
+PRECISE_SIGMA_M = 0.2  # of the position among its landmarks: the widest an answer may be
 LOCAL_SIGMA_M = 0.05  # of mapped landmarks against their neighbours
 SHARED = 0.9  # of the smallest covariance around, which neighbours have in common
 FITTED_MOST = 16  # places fitted
@@ -38,7 +39,7 @@ class Verdict(Enum):
 
     CONFIDENT = "confident"
     AMBIGUOUS = "ambiguous"  # another place, or none, is not unlikely enough
-    UNSUPPORTED = "unsupported"  # too few landmarks fit, or they fit too badly
+    UNSUPPORTED = "unsupported"  # too few landmarks fit, or too badly, or they leave the position too wide
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,7 +128,8 @@ def _scores(motions: Floats, observed: Constellation, known: Constellation) -> F
 
 def _different(motions: Floats, *, most: int) -> list[Floats]:
     """The first of each place among motions (k, 3), in order, at most so many."""
-    left, found = motions, list[Floats]()
+    left = motions
+    found: list[Floats] = []
     while len(left) and len(found) < most:
         found.append(left[0])
         left = left[~_is_near(left - left[0])]
@@ -150,7 +152,9 @@ def _risk(log_evidence: Sequence[float]) -> float:
 def _verdict(best: FittedMotion, risk: float, observed_count: int) -> Verdict:
     matched = len(best.pairs)
     enough = matched >= max(MATCHED_LEAST, MATCHED_SHARE * observed_count)
-    if not enough or best.chi_square > _chi_square_limit(2 * matched - 3):
+    widest_m2 = float(np.linalg.eigvalsh(best.covariance[:2, :2])[-1])
+    fits = best.chi_square <= _chi_square_limit(2 * matched - 3)
+    if not enough or not fits or widest_m2 > PRECISE_SIGMA_M**2:
         return Verdict.UNSUPPORTED
     return Verdict.CONFIDENT if risk <= RISK_LIMIT else Verdict.AMBIGUOUS
 
