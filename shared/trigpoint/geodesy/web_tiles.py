@@ -24,3 +24,9 @@ def tile_at(position: Wgs84Position, zoom: int) -> WebTile:
     column = math.floor((position.lon_deg + 180.0) / 360.0 * count)
     row = math.floor((1.0 - math.asinh(math.tan(lat_rad)) / math.pi) / 2.0 * count)
     return WebTile(zoom, min(max(column, 0), count - 1), min(max(row, 0), count - 1))
+
+
+def corner_of(zoom: int, column: float, row: float) -> tuple[float, float]:
+    """Longitude and latitude in degrees of a place on the tiles' grid; whole numbers are tiles' north-western corners."""
+    count = 1 << zoom
+    return 360.0 * column / count - 180.0, math.degrees(math.atan(math.sinh(math.pi * (1.0 - 2.0 * row / count))))
