@@ -1,0 +1,196 @@
+"""The landmarks of one map version in memory, found by place and condition, each as the bytes it is answered with."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trigpoint.geodesy.projection import geodesic_distances_m
+from trigpoint.landmarks.messages import entry_of, landmark_bytes
+from trigpoint.landmarks.model import Landmark
+from trigpoint.landmarks.queries import DegreeBox, Disc, LandmarkQuery, Nearest, area_box
+from trigpoint.landmarks.selection import WIDENING_M
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+CELL_DEG = 1.0 / 1024.0  # of the grid: some 100 m
+CELLS_MOST = 4096  # looked up one by one; a wider area is looked for among all
+FIRST_ROOM = 1024
+
+LAT, LON, SIGMA = range(3)
+FIRST_SEEN, LAST_SEEN, KIND = range(3)
+
+
+@dataclass(frozen=True, slots=True)
+class FoundSlots:
+    """Where the landmarks of an answer are held, in its order, how far each is in m (0 where nobody asked), and
+    whether more would follow."""
+
+    slots: list[int]
+    distances_m: list[float]
+    more: bool
+
+
+class MemoryIndex:
+    """Landmarks by id in slots; the grid's cells say which slots lie in them. Not for several threads at once."""
+
+    def __init__(self) -> None:
+        self._numbers: Floats = np.zeros((FIRST_ROOM, 3))  # lat and lon in degrees, sigma in m
+        self._wholes: Ints = np.zeros((FIRST_ROOM, 3), dtype=np.int64)  # first and last seen in ns, kind
+        self._held: Bools = np.zeros(FIRST_ROOM, dtype=np.bool_)
+        self._names: list[str] = []
+        self._vehicles: list[tuple[str, ...]] = []
+        self._bytes: list[bytes] = []
+        self._entries: list[bytes] = []
+        self._kinds: dict[str, int] = {}
+        self._slots: dict[str, int] = {}
+        self._free: list[int] = []
+        self._cells: dict[tuple[int, int], set[int]] = {}
+
+    def __len__(self) -> int:
+        return len(self._slots)
+
+    def name(self, slot: int) -> str:
+        """The id of a landmark."""
+        return self._names[slot]
+
+    def entries(self, slots: Sequence[int]) -> list[bytes]:
+        """Landmarks as they stand in an answer."""
+        entries = self._entries
+        return [entries[slot] for slot in slots]
+
+    def landmarks(self, slots: Sequence[int]) -> list[bytes]:
+        """Landmarks as the bytes of their messages."""
+        return [self._bytes[slot] for slot in slots]
+
+    def places_deg(self, slots: Sequence[int]) -> tuple[Floats, Floats]:
+        """Latitudes and longitudes (n,)."""
+        return self._numbers[slots, LAT], self._numbers[slots, LON]
+
+    def change(self, changed: Iterable[Landmark], removed: Iterable[str]) -> None:
+        """Landmarks put in, in the place of those of their ids, and others taken out."""
+        for name in removed:
+            self._take_out(name)
+        for landmark in changed:
+            self._take_out(landmark.landmark)
+            self._put_in(landmark)
+
+    def _take_out(self, name: str) -> None:
+        slot = self._slots.pop(name, None)
+        if slot is None:
+            return
+        cell = _cell(self._numbers[slot, LAT], self._numbers[slot, LON])
+        self._cells[cell].discard(slot)
+        if not self._cells[cell]:
+            del self._cells[cell]
+        self._held[slot] = False
+        self._free.append(slot)
+
+    def _put_in(self, landmark: Landmark) -> None:
+        slot = self._free.pop() if self._free else self._new_slot()
+        kind = self._kinds.setdefault(landmark.kind, len(self._kinds))
+        self._numbers[slot] = (landmark.lat_deg, landmark.lon_deg, landmark.sigma_major_m)
+        self._wholes[slot] = (landmark.first_seen_ns, landmark.last_seen_ns, kind)
+        self._held[slot] = True
+        self._names[slot], self._vehicles[slot] = landmark.landmark, landmark.vehicles
+        self._bytes[slot] = landmark_bytes(landmark)
+        self._entries[slot] = entry_of(self._bytes[slot])
+        self._slots[landmark.landmark] = slot
+        self._cells.setdefault(_cell(landmark.lat_deg, landmark.lon_deg), set()).add(slot)
+
+    def _new_slot(self) -> int:
+        slot = len(self._names)
+        if slot == len(self._held):
+            self._numbers = np.concatenate([self._numbers, np.zeros_like(self._numbers)])
+            self._wholes = np.concatenate([self._wholes, np.zeros_like(self._wholes)])
+            self._held = np.concatenate([self._held, np.zeros_like(self._held)])
+        self._names.append("")
+        self._vehicles.append(())
+        self._bytes.append(b"")
+        self._entries.append(b"")
+        return slot
+
+    def found(self, query: LandmarkQuery) -> FoundSlots:
+        """The landmarks that meet a query, whatever version it names, as a store would answer it."""
+        if query.nearest is not None:
+            ranked = self._nearest(query, query.nearest)
+        elif query.near is not None:
+            ranked = self._within(query, query.near, query.near.radius_m)
+        else:
+            ranked = [(0.0, name, slot) for name, slot in self._by_id(query)]
+        if query.after is not None:
+            mark = (query.after.distance_m or 0.0, query.after.landmark)
+            ranked = [one for one in ranked if one[:2] > mark]
+        kept = ranked[: query.limit]
+        return FoundSlots([one[2] for one in kept], [one[0] for one in kept], len(kept) < len(ranked))
+
+    def _by_id(self, query: LandmarkQuery) -> list[tuple[str, int]]:
+        names = self._names
+        return sorted((names[slot], slot) for slot in self._meeting(query).tolist())
+
+    def _within(self, query: LandmarkQuery, around: Disc, radius_m: float) -> list[tuple[float, str, int]]:
+        """What meets the conditions within a radius, in order of distance."""
+        slots = self._meeting(query)
+        lat_deg, lon_deg = self._numbers[slots, LAT], self._numbers[slots, LON]
+        distance_m = geodesic_distances_m(around.lat_deg, around.lon_deg, lat_deg=lat_deg, lon_deg=lon_deg)
+        pairs = zip(distance_m.tolist(), slots.tolist(), strict=True)
+        return sorted((far_m, self._names[slot], slot) for far_m, slot in pairs if far_m <= radius_m)
+
+    def _nearest(self, query: LandmarkQuery, place: Nearest) -> list[tuple[float, str, int]]:
+        anywhere = replace(query, nearest=None)
+        for radius_m in WIDENING_M:
+            around = Disc(lat_deg=place.lat_deg, lon_deg=place.lon_deg, radius_m=radius_m)
+            found = self._within(replace(anywhere, near=around), around, radius_m)
+            if len(found) >= place.count:
+                return found[: place.count]
+        return self._within(anywhere, around, math.inf)[: place.count]
+
+    def _meeting(self, query: LandmarkQuery) -> Ints:
+        """The slots (n,) that meet every condition but distance, in no order."""
+        slots = self._around(area_box(query))
+        slots = slots[self._conditions(query, slots)]
+        if query.vehicle is None:
+            return slots
+        saw = [query.vehicle in self._vehicles[slot] for slot in slots.tolist()]
+        return slots[np.array(saw, dtype=np.bool_)]
+
+    def _conditions(self, query: LandmarkQuery, slots: Ints) -> Bools:
+        numbers, wholes = self._numbers[slots], self._wholes[slots]
+        meets = np.ones(len(slots), dtype=np.bool_)
+        if query.bbox is not None:
+            meets &= _inside(numbers, query.bbox)
+        if query.max_sigma_m is not None:
+            meets &= numbers[:, SIGMA] <= query.max_sigma_m
+        if query.seen is not None:
+            meets &= (wholes[:, FIRST_SEEN] <= query.seen.last_ns) & (wholes[:, LAST_SEEN] >= query.seen.first_ns)
+        if query.kinds:
+            meets &= np.isin(wholes[:, KIND], [self._kinds.get(kind, -1) for kind in query.kinds])
+        return meets
+
+    def _around(self, box: DegreeBox | None) -> Ints:
+        """All slots in the cells a box meets, and perhaps more."""
+        if box is not None:
+            low = _cell(box.lat_min_deg, box.lon_min_deg)
+            high = _cell(box.lat_max_deg, box.lon_max_deg)
+            if (high[0] - low[0] + 1) * (high[1] - low[1] + 1) <= CELLS_MOST:
+                cells = self._cells
+                rows, columns = range(low[0], high[0] + 1), range(low[1], high[1] + 1)
+                there = [cells[row, column] for row in rows for column in columns if (row, column) in cells]
+                return np.fromiter(chain.from_iterable(there), dtype=np.int64)
+        return np.flatnonzero(self._held)
+
+
+def _cell(lat_deg: float, lon_deg: float) -> tuple[int, int]:
+    return math.floor(lat_deg / CELL_DEG), math.floor(lon_deg / CELL_DEG)
+
+
+def _inside(numbers: Floats, box: DegreeBox) -> Bools:
+    lat_deg, lon_deg = numbers[:, LAT], numbers[:, LON]
+    inside = (lat_deg >= box.lat_min_deg) & (lat_deg <= box.lat_max_deg)
+    inside &= (lon_deg >= box.lon_min_deg) & (lon_deg <= box.lon_max_deg)
+    return np.asarray(inside)
