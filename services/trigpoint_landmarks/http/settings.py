@@ -23,7 +23,8 @@ class WebSettings:
     written, and nobody needs a token; with `open_reading` nobody needs one to read. `origins` are the web pages'
     origins that may call from a browser. A token, and an address without one, may ask `rate_hz` times a second and
     `burst` times at once. A body has at most `body_limit_bytes`, and has to arrive within `body_timeout_s`. Tiles are
-    kept in `tile_cache_mib` of memory. Without word from the bus the database is looked at every `look_s`.
+    kept in `tile_cache_mib` of memory. The database is looked at every `look_s`, and at once
+    when the bus tells of a new version, if it is to be listened to.
     """
 
     host: Name = "127.0.0.1"
@@ -40,6 +41,7 @@ class WebSettings:
     connections: Annotated[int, Field(ge=1, le=64)] = 4
     tile_cache_mib: Count = 64
     look_s: Seconds = 1.0
+    listen_to_bus: bool = True
 
     def __post_init__(self) -> None:
         for name, url in (("public_url", self.public_url), *(("origins", origin) for origin in self.origins)):
