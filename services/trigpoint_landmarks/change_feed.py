@@ -86,16 +86,20 @@ class ChangeFeed:
 
     def _messages(self, step: DurableStep) -> Iterator[BusMessage]:
         """The tiles' messages, and last the version's."""
-        names = {"root": self._root, "map_name": self._map_name}
+        root, map_name = self._root, self._map_name
         stamp_ns = step.map.solved_ns
         for change in step.tiles or ():
             tile = change.tile
-            key = map_key(TILE_CHANGE_PATTERN, **names, zoom=tile.zoom, column=tile.column, row=tile.row)
+            chunks = {"zoom": tile.zoom, "column": tile.column, "row": tile.row}
+            key = map_key(TILE_CHANGE_PATTERN, root=root, map_name=map_name, chunks=chunks)
             yield self._message(key, TILE_SCHEMA, tile_change_bytes(change), stamp_ns)
         tiles = None if step.tiles is None else frozenset(change.tile for change in step.tiles)
         told = VersionChange(map=step.map, before=step.before, tiles=tiles)
         yield self._message(
-            map_key(VERSION_CHANGE_PATTERN, **names), VERSION_SCHEMA, version_change_bytes(told), stamp_ns
+            map_key(VERSION_CHANGE_PATTERN, root=root, map_name=map_name),
+            VERSION_SCHEMA,
+            version_change_bytes(told),
+            stamp_ns,
         )
 
     def _message(self, key: str, schema_name: str, payload: bytes, stamp_ns: int) -> BusMessage:

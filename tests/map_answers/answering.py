@@ -32,9 +32,10 @@ class NothingObserved:
 
 @dataclass(frozen=True, slots=True)
 class AnsweredStore:
-    """What a test has: the store to write to, which tells of it, and what the service counts."""
+    """What a test has: the store to write to, which tells of it; the same without a word; and the service's counts."""
 
     store: LandmarkStore
+    silent: LandmarkStore
     instruments: Instruments
 
 
@@ -72,7 +73,7 @@ def answered(
         thread.start()
         until(lambda: service.ready and bus.await_queryable(KEY, SOON_S))
         try:
-            yield AnsweredStore(FeedingStore(store, feed) if tells else store, instruments)
+            yield AnsweredStore(FeedingStore(store, feed) if tells else store, store, instruments)
         finally:
             stop.set()
             thread.join()

@@ -17,8 +17,11 @@ from trigpoint_landmarks.live import LandmarkProjection
 def opened(settings: Settings, instruments: Instruments) -> Iterator[Service]:
     """The projection of the fleet's log into its database, woken up by its bus, telling of what it made durable."""
     open_store = partial(opened_store, database_url(settings), password_file=settings.database.password_file)
-    names = {"root": settings.fleet.root, "map_name": settings.fleet.map}
-    with opened_resources(settings) as resources, ChangeFeed(resources.bus, **names) as feed:
+    fleet = settings.fleet
+    with (
+        opened_resources(settings) as resources,
+        ChangeFeed(resources.bus, root=fleet.root, map_name=fleet.map) as feed,
+    ):
         yield LandmarkProjection(
             resources.log,
             lambda: FeedingStore(open_store(), feed),

@@ -111,7 +111,7 @@ class MapAnswers:
                 self._over.set()
 
     def _answer(self, stop: threading.Event) -> None:
-        expression = map_key(ASK_PATTERN, root=self._root, map_name=self._map_name, question="*")
+        expression = map_key(ASK_PATTERN, root=self._root, map_name=self._map_name, chunks={"question": "*"})
         lost = 0
         with closing(self._bus.queryable(expression)) as queryable:
             while not (stop.is_set() or self._over.is_set()):

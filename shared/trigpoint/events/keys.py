@@ -1,6 +1,7 @@
 """Where an event goes: its key on the bus and its stream in the log."""
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from trigpoint.errors import InputError
@@ -139,7 +140,13 @@ def key_expression(event_class: type, *, root: str = DEFAULT_ROOT) -> str:
     return f"{valid_name(root)}/{KEY_VERSION}/{KEY_PATTERNS[event_class].format(**wild)}"
 
 
-def map_key(pattern: str, *, root: str = DEFAULT_ROOT, map_name: str = DEFAULT_MAP, **chunks: str | int) -> str:
+def map_key(
+    pattern: str,
+    *,
+    root: str = DEFAULT_ROOT,
+    map_name: str = DEFAULT_MAP,
+    chunks: Mapping[str, str | int] = MappingProxyType({}),
+) -> str:
     """A key of one map that is no event's: where it is asked, or told of its changes; a chunk `*` matches any.
 
     Raises InputError for a name that cannot be a chunk of a key.
