@@ -19,6 +19,7 @@ from figures import (
     mrclam,
     nclt,
     projection,
+    query,
     relocalise,
     security,
     security_fuzz,
@@ -42,6 +43,7 @@ GROUPS: Mapping[str, Sequence[Figure]] = {
     ),
     "ingest": (*ingest.FIGURES, *projection.FIGURES),
     "live": live.FIGURES,
+    "query": query.FIGURES,
     "relocalise": relocalise.FIGURES,
     "security": (*security.FIGURES, *security_fuzz.FIGURES),
 }

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from itertools import chain
 
@@ -21,6 +22,8 @@ Bools = NDArray[np.bool_]
 CELL_DEG = 1.0 / 1024.0  # of the grid: some 100 m
 CELLS_MOST = 4096  # looked up one by one; a wider area is looked for among all
 FIRST_ROOM = 1024
+
+NOTHING: frozenset[int] = frozenset()
 
 LAT, LON, SIGMA = range(3)
 FIRST_SEEN, LAST_SEEN, KIND = range(3)
@@ -43,6 +46,7 @@ class MemoryIndex:
         self._numbers: Floats = np.zeros((FIRST_ROOM, 3))  # lat and lon in degrees, sigma in m
         self._wholes: Ints = np.zeros((FIRST_ROOM, 3), dtype=np.int64)  # first and last seen in ns, kind
         self._held: Bools = np.zeros(FIRST_ROOM, dtype=np.bool_)
+        self._places: list[tuple[float, float]] = []  # lat and lon again: one by one these are read faster
         self._names: list[str] = []
         self._vehicles: list[tuple[str, ...]] = []
         self._bytes: list[bytes] = []
@@ -84,7 +88,7 @@ class MemoryIndex:
         slot = self._slots.pop(name, None)
         if slot is None:
             return
-        cell = _cell(self._numbers[slot, LAT], self._numbers[slot, LON])
+        cell = _cell(*self._places[slot])
         self._cells[cell].discard(slot)
         if not self._cells[cell]:
             del self._cells[cell]
@@ -94,6 +98,7 @@ class MemoryIndex:
     def _put_in(self, landmark: Landmark) -> None:
         slot = self._free.pop() if self._free else self._new_slot()
         kind = self._kinds.setdefault(landmark.kind, len(self._kinds))
+        self._places[slot] = (landmark.lat_deg, landmark.lon_deg)
         self._numbers[slot] = (landmark.lat_deg, landmark.lon_deg, landmark.sigma_major_m)
         self._wholes[slot] = (landmark.first_seen_ns, landmark.last_seen_ns, kind)
         self._held[slot] = True
@@ -110,13 +115,15 @@ class MemoryIndex:
             self._wholes = np.concatenate([self._wholes, np.zeros_like(self._wholes)])
             self._held = np.concatenate([self._held, np.zeros_like(self._held)])
         self._names.append("")
+        self._places.append((0.0, 0.0))
         self._vehicles.append(())
         self._bytes.append(b"")
         self._entries.append(b"")
         return slot
 
-    def found(self, query: LandmarkQuery) -> FoundSlots:
-        """The landmarks that meet a query, whatever version it names, as a store would answer it."""
+    def found(self, query: LandmarkQuery, *, limit: int | None = None) -> FoundSlots:
+        """The landmarks that meet a query, whatever version it names, as a store would answer it; `limit` in the place
+        of the query's, if that has none."""
         if query.nearest is not None:
             ranked = self._nearest(query, query.nearest)
         elif query.near is not None:
@@ -126,7 +133,7 @@ class MemoryIndex:
         if query.after is not None:
             mark = (query.after.distance_m or 0.0, query.after.landmark)
             ranked = [one for one in ranked if one[:2] > mark]
-        kept = ranked[: query.limit]
+        kept = ranked[: query.limit or limit]
         return FoundSlots([one[2] for one in kept], [one[0] for one in kept], len(kept) < len(ranked))
 
     def _by_id(self, query: LandmarkQuery) -> list[tuple[str, int]]:
@@ -152,7 +159,9 @@ class MemoryIndex:
 
     def _meeting(self, query: LandmarkQuery) -> Ints:
         """The slots (n,) that meet every condition but distance, in no order."""
-        slots = self._around(area_box(query))
+        slots = self._in_area(query)
+        if not (query.kinds or query.max_sigma_m is not None or query.seen is not None or query.vehicle is not None):
+            return slots
         slots = slots[self._conditions(query, slots)]
         if query.vehicle is None:
             return slots
@@ -162,8 +171,6 @@ class MemoryIndex:
     def _conditions(self, query: LandmarkQuery, slots: Ints) -> Bools:
         numbers, wholes = self._numbers[slots], self._wholes[slots]
         meets = np.ones(len(slots), dtype=np.bool_)
-        if query.bbox is not None:
-            meets &= _inside(numbers, query.bbox)
         if query.max_sigma_m is not None:
             meets &= numbers[:, SIGMA] <= query.max_sigma_m
         if query.seen is not None:
@@ -172,17 +179,31 @@ class MemoryIndex:
             meets &= np.isin(wholes[:, KIND], [self._kinds.get(kind, -1) for kind in query.kinds])
         return meets
 
-    def _around(self, box: DegreeBox | None) -> Ints:
-        """All slots in the cells a box meets, and perhaps more."""
+    def _in_area(self, query: LandmarkQuery) -> Ints:
+        """The slots (n,) inside a query's box; of a disc, those of the cells around it."""
+        box, cells = query.bbox, self._cells_around(area_box(query))
+        if cells is None:
+            slots = np.flatnonzero(self._held)
+            return slots if box is None else slots[_inside(self._numbers[slots], box)]
+        near = chain.from_iterable(cells)
         if box is not None:
-            low = _cell(box.lat_min_deg, box.lon_min_deg)
-            high = _cell(box.lat_max_deg, box.lon_max_deg)
-            if (high[0] - low[0] + 1) * (high[1] - low[1] + 1) <= CELLS_MOST:
-                cells = self._cells
-                rows, columns = range(low[0], high[0] + 1), range(low[1], high[1] + 1)
-                there = [cells[row, column] for row in rows for column in columns if (row, column) in cells]
-                return np.fromiter(chain.from_iterable(there), dtype=np.int64)
-        return np.flatnonzero(self._held)
+            places, west, south, east, north = self._places, *_edges(box)
+            near = (slot for slot in near if south <= places[slot][0] <= north and west <= places[slot][1] <= east)
+        return np.fromiter(near, dtype=np.int64)
+
+    def _cells_around(self, box: DegreeBox | None) -> list[AbstractSet[int]] | None:
+        """The slots of each cell a box meets; None for more cells than are looked up one by one."""
+        if box is None:
+            return None
+        low, high = _cell(box.lat_min_deg, box.lon_min_deg), _cell(box.lat_max_deg, box.lon_max_deg)
+        if (high[0] - low[0] + 1) * (high[1] - low[1] + 1) > CELLS_MOST:
+            return None
+        rows, columns = range(low[0], high[0] + 1), range(low[1], high[1] + 1)
+        return [self._cells.get((row, column), NOTHING) for row in rows for column in columns]
+
+
+def _edges(box: DegreeBox) -> tuple[float, float, float, float]:
+    return box.lon_min_deg, box.lat_min_deg, box.lon_max_deg, box.lat_max_deg
 
 
 def _cell(lat_deg: float, lon_deg: float) -> tuple[int, int]:

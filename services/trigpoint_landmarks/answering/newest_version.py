@@ -38,6 +38,7 @@ class NewestVersion:
     def __init__(self) -> None:
         self._index = MemoryIndex()
         self.map = AnsweredMap()
+        self._head = landmark_answer_bytes(self.map, ())
 
     @property
     def map_version(self) -> int:
@@ -53,6 +54,7 @@ class NewestVersion:
         """From now on this version, which differs from the one before by these landmarks."""
         self._index.change(changed, removed)
         self.map = to
+        self._head = landmark_answer_bytes(to, ())
 
     def is_asked(self, question: LandmarkQuestion) -> bool:
         """Whether a question is about this version: the one it names, or that of its page, else the newest there is.
@@ -62,25 +64,28 @@ class NewestVersion:
         query = resumed(question.query, question.page) if question.page else question.query
         return query.as_of in (None, self.map_version)
 
-    def page(self, question: LandmarkQuestion, *, bytes_most: int) -> Content:
-        """The page a question asks for, of `query.limit` landmarks and so many bytes at most, but one landmark.
+    def page(self, question: LandmarkQuestion, *, limit: int, bytes_most: int) -> Content:
+        """The page a question asks for, of `limit` landmarks if it names no number, and at most so many bytes, but one
+        landmark.
 
         Raises InputError for a page that is none, and for a CRS that is not known.
         """
         query = resumed(question.query, question.page) if question.page else question.query
-        query = replace(query, as_of=self.map_version)
-        found = self._index.found(query)
+        found = self._index.found(query, limit=limit)
         encoded = self._encoded(found.slots, question)
         kept = _fitting(encoded, bytes_most)
         token = self._next_page(query, found, kept)
         if question.form is AnswerForm.GEOJSON:
             return _collection(self.map, encoded[:kept], crs=question.crs, next_page=token)
+        if not (question.crs or token):
+            return Content(b"".join((self._head, *encoded)), ANSWER_SCHEMA)
         payload = landmark_answer_bytes(self.map, encoded[:kept], crs=question.crs, next_page=token)
         return Content(payload, ANSWER_SCHEMA)
 
     def _next_page(self, query: LandmarkQuery, found: FoundSlots, kept: int) -> str:
         if not kept or (kept == len(found.slots) and not found.more):
             return ""
+        query = replace(query, as_of=self.map_version)
         distance_m = found.distances_m[kept - 1] if query.by_distance else None
         return next_page_token(query, PageMark(landmark=self._index.name(found.slots[kept - 1]), distance_m=distance_m))
 
@@ -142,6 +147,8 @@ def feature_bytes(landmark: Landmark, point: Point | None) -> bytes:
 
 def _fitting(encoded: Sequence[bytes], bytes_most: int) -> int:
     """How many of them fit, at least one."""
+    if sum(map(len, encoded)) <= bytes_most:
+        return len(encoded)
     size = 0
     for count, one in enumerate(encoded):
         size += len(one)

@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from trigpoint.bus.ports import Bus, Content, Query
 from trigpoint.errors import DatabaseUnavailable, InputError, ServiceError
@@ -140,17 +140,15 @@ class MapAnswers:
             self._refuse(query, "busy", f"{self._settings.waiting_most} questions wait already: ask again later")
 
     def _checked(self, content: Content) -> Question:
-        """The question, with the limit it has if it names none. Raises InputError for one outside the limits."""
+        """The question. Raises InputError for one outside the limits."""
         settings = self._settings
         if len(content.payload) > settings.question_bytes:
             raise InputError(f"a question of {len(content.payload)} bytes: at most {settings.question_bytes}")
         question = decoded_question(content.schema_name, content.payload)
-        if not isinstance(question, LandmarkQuestion):
-            return question
-        limit = question.query.limit
+        limit = question.query.limit if isinstance(question, LandmarkQuestion) else None
         if limit is not None and limit > settings.page_most:
             raise InputError(f"limit {limit}: at most {settings.page_most} landmarks are on a page")
-        return question if limit else replace(question, query=replace(question.query, limit=settings.page_landmarks))
+        return question
 
     def _from_memory(self, question: Question) -> Content | None:
         """The answer, or None where memory does not have it. Raises InputError."""
@@ -159,11 +157,15 @@ class MapAnswers:
         with self._followed.reading() as newest:
             if not newest.is_asked(question):
                 return None
-            return newest.page(question, bytes_most=self._settings.answer_bytes)
+            settings = self._settings
+            return newest.page(question, limit=settings.page_landmarks, bytes_most=settings.answer_bytes)
 
     def _answer_from_store(self) -> None:
         with closing(self._open_store()) as store:
-            answers = StoredAnswers(store, self._coverage, bytes_most=self._settings.answer_bytes)
+            settings = self._settings
+            answers = StoredAnswers(
+                store, self._coverage, page_landmarks=settings.page_landmarks, bytes_most=settings.answer_bytes
+            )
             while not self._over.is_set():
                 try:
                     waiting = self._waiting.get(timeout=LOOK_S)

@@ -34,8 +34,9 @@ class Coverage(Protocol):
 class StoredAnswers:
     """Answers of one open store; not for several threads at once."""
 
-    def __init__(self, store: LandmarkStore, coverage: Coverage, *, bytes_most: int) -> None:
-        self._store, self._coverage, self._bytes_most = store, coverage, bytes_most
+    def __init__(self, store: LandmarkStore, coverage: Coverage, *, page_landmarks: int, bytes_most: int) -> None:
+        self._store, self._coverage = store, coverage
+        self._page_landmarks, self._bytes_most = page_landmarks, bytes_most
         self._maps: dict[int, AnsweredMap] = {}
 
     def answer(self, question: Question) -> Content:
@@ -54,8 +55,9 @@ class StoredAnswers:
         return content
 
     def _landmarks(self, question: LandmarkQuestion) -> Content:
-        page = page_of(self._store, question.query, token=question.page)
-        query = replace(question.query, as_of=page.map_version)
+        asked = replace(question.query, limit=question.query.limit or self._page_landmarks)
+        page = page_of(self._store, asked, token=question.page)
+        query = replace(asked, as_of=page.map_version)
         return stored_page(
             self._map(page.map_version), page, replace(question, query=query), bytes_most=self._bytes_most
         )
