@@ -103,7 +103,7 @@ def test_a_notice_may_be_said_where_the_access_rules_let_its_writer() -> None:
         for notice in dataflow.NOTICES
         if not any(
             key_matches(allowed, notice.pattern.format(**wild))
-            for allowed in (access.LANDMARKS.answer if notice.asked_with else access.LANDMARKS.publish)
+            for allowed in (access.ANSWERS.answer if notice.asked_with else access.LANDMARKS.publish)
         )
     ]
     assert refused == []

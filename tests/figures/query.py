@@ -57,5 +57,5 @@ FIGURES = (
     ),
     queried("landmarks in an answer, mean", "", None, lambda found: float(found.found.mean())),
     reached("a moved landmark at a subscribed client after its version is durable, p99", at_most(200.0), 99),
-    reached("the same, p50", None, 50),
+    reached("the same moved landmark, p50", None, 50),
 )
