@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -64,14 +65,15 @@ class PostgisFeatures:
         """The features that meet a query."""
         if query.layer is LANDMARKS:
             return await self._landmark_page(query, state)
-        statement, values = row_page_statement(query, state)
+        as_of = state.newest if query.as_of is None else query.as_of
+        statement, values = row_page_statement(replace(query, as_of=as_of), state)
         async with self._connection() as connection:
             found = await connection.cursor(row_factory=dict_row).execute(statement, values)
             rows = [_row(record, query.layer) for record in await found.fetchall()]
         features = [map_feature(row, state.crs) for row in rows]
         shown = features[: query.limit]
         return FeaturePage(
-            map_version=query.as_of or state.newest,
+            map_version=as_of,
             features=features_json(shown, query.crs),
             count=len(shown),
             next_id=features[query.limit].feature_id if len(features) > query.limit else None,

@@ -174,6 +174,7 @@ def _properties_of(feature: ReadFeature) -> str:
 
 def test_the_newest_version_is_shown_unless_another_is_asked_for(source: Asked) -> None:
     assert source.features() == source.features(as_of=2) != source.features(as_of=1)
+    assert source.features(TRAJECTORIES) == source.features(TRAJECTORIES, as_of=2)
     assert (source.page().map_version, source.page(as_of=1).map_version) == (2, 1)
 
 
