@@ -159,4 +159,4 @@ def reach_times_ms(*, versions: int, pause_s: float) -> Floats:
         running.stdin.close()
         assert running.stdout is not None
         durable_ns = json.loads(running.stdout.readline())
-    return (np.array(held_ns) - np.array(durable_ns)) / 1e6
+    return np.asarray((np.array(held_ns) - np.array(durable_ns)) / 1e6, dtype=np.float64)

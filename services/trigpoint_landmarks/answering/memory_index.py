@@ -185,7 +185,7 @@ class MemoryIndex:
         if cells is None:
             slots = np.flatnonzero(self._held)
             return slots if box is None else slots[_inside(self._numbers[slots], box)]
-        near = chain.from_iterable(cells)
+        near: Iterable[int] = chain.from_iterable(cells)
         if box is not None:
             places, west, south, east, north = self._places, *_edges(box)
             near = (slot for slot in near if south <= places[slot][0] <= north and west <= places[slot][1] <= east)
