@@ -43,7 +43,7 @@ class MapApi:
     pages: Pages
     tiles: Tiles
     layers: tuple[Layer, ...]
-    corrections_document: Callable[[], Any]
+    written: JsonObject
 
     def asked(self, request: Request) -> Asked:
         """What a request asks."""
@@ -79,7 +79,7 @@ class MapApi:
     async def api(self, request: Request) -> Response:
         """The API's definition."""
         asked = self.asked(request)
-        content = api_document(self.corrections_document(), self.layers, base_url=asked.base_url)
+        content = api_document(self.written, self.layers, base_url=asked.base_url)
         return _json(asked, content, OPENAPI_JSON)
 
     async def collections(self, request: Request) -> Response:
@@ -206,23 +206,27 @@ def _html(page: JsonObject) -> str:
     return f"{head}<h1>{title}</h1><p>{description}</p><ul>{''.join(lines)}</ul></html>"
 
 
+def corrections_definition() -> JsonObject:
+    """What the framework says of the routes that write."""
+    described = FastAPI(openapi_url=None)
+    described.include_router(labelling_router(None))
+    return described.openapi()
+
+
 def application(
     settings: WebSettings, source: FeatureSource, watch: MapWatch, corrections: MapCorrections | None
 ) -> Any:
     """The ASGI application. Raises InputError for a token file that cannot be read."""
     admission = Admission(settings)
     framework = FastAPI(openapi_url=None, docs_url=None, redoc_url=None, redirect_slashes=False)
-    router = labelling_router(corrections)
-    framework.include_router(router)
-    described = FastAPI(openapi_url=None)
-    described.include_router(router)
+    framework.include_router(labelling_router(corrections))
     api = MapApi(
         settings=settings,
         watch=watch,
         pages=Pages(source, watch, None if corrections is None else corrections.drives),
         tiles=Tiles(source, watch, cache_bytes=settings.tile_cache_mib * MEBIBYTE, public=admission.is_open),
         layers=tuple(layer for layer in LAYERS.values() if layer.stored or corrections is not None),
-        corrections_document=described.openapi,
+        written=corrections_definition(),
     )
     for path, handler in api.routes().items():
         framework.add_route(path, handler, methods=["GET"], include_in_schema=False)
