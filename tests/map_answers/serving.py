@@ -101,7 +101,9 @@ def moving(endpoint: str, versions: str, pause_s: str) -> None:
             sys.stdin.readline()
             for version in range(2, int(versions) + 2):
                 moved = [replace(row, last_seen_ns=START_NS + version) for row in rows[version % 200 :: 200]]
-                told.apply(change(version, opened=moved, closed=[row.landmark for row in moved]), checkpoint(version))
+                step = change(version, opened=moved, closed=[row.landmark for row in moved])
+                twin.apply(step, checkpoint(version))
+                told.apply(step, checkpoint(version))
                 pause.wait(float(pause_s))
             sys.stdin.read()
         sys.stdout.write(json.dumps(store.durable_ns[1:]) + "\n")

@@ -1,10 +1,10 @@
 """The landmarks of one map version in memory, found by place and condition, each as the bytes it is answered with."""
 
 import math
-from collections.abc import Iterable, Sequence
-from collections.abc import Set as AbstractSet
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +18,13 @@ from trigpoint.landmarks.selection import WIDENING_M
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+Place = tuple[float, float]  # latitude and longitude in degrees
 
 CELL_DEG = 1.0 / 1024.0  # of the grid: some 100 m
 CELLS_MOST = 4096  # looked up one by one; a wider area is looked for among all
 FIRST_ROOM = 1024
 
-NOTHING: frozenset[int] = frozenset()
+NOTHING: Mapping[int, Place] = MappingProxyType({})
 
 LAT, LON, SIGMA = range(3)
 FIRST_SEEN, LAST_SEEN, KIND = range(3)
@@ -31,11 +32,11 @@ FIRST_SEEN, LAST_SEEN, KIND = range(3)
 
 @dataclass(frozen=True, slots=True)
 class FoundSlots:
-    """Where the landmarks of an answer are held, in its order, how far each is in m (0 where nobody asked), and
-    whether more would follow."""
+    """Where the landmarks of an answer are held, in its order, how far each is in m (none where nobody asked),
+    and whether more would follow."""
 
     slots: list[int]
-    distances_m: list[float]
+    distances_m: Sequence[float]
     more: bool
 
 
@@ -46,7 +47,7 @@ class MemoryIndex:
         self._numbers: Floats = np.zeros((FIRST_ROOM, 3))  # lat and lon in degrees, sigma in m
         self._wholes: Ints = np.zeros((FIRST_ROOM, 3), dtype=np.int64)  # first and last seen in ns, kind
         self._held: Bools = np.zeros(FIRST_ROOM, dtype=np.bool_)
-        self._places: list[tuple[float, float]] = []  # lat and lon again: one by one these are read faster
+        self._places: list[Place] = []  # lat and lon again: one by one these are read faster
         self._names: list[str] = []
         self._vehicles: list[tuple[str, ...]] = []
         self._bytes: list[bytes] = []
@@ -54,7 +55,7 @@ class MemoryIndex:
         self._kinds: dict[str, int] = {}
         self._slots: dict[str, int] = {}
         self._free: list[int] = []
-        self._cells: dict[tuple[int, int], set[int]] = {}
+        self._cells: dict[tuple[int, int], dict[int, Place]] = {}
 
     def __len__(self) -> int:
         return len(self._slots)
@@ -89,7 +90,7 @@ class MemoryIndex:
         if slot is None:
             return
         cell = _cell(*self._places[slot])
-        self._cells[cell].discard(slot)
+        del self._cells[cell][slot]
         if not self._cells[cell]:
             del self._cells[cell]
         self._held[slot] = False
@@ -106,7 +107,7 @@ class MemoryIndex:
         self._bytes[slot] = landmark_bytes(landmark)
         self._entries[slot] = entry_of(self._bytes[slot])
         self._slots[landmark.landmark] = slot
-        self._cells.setdefault(_cell(landmark.lat_deg, landmark.lon_deg), set()).add(slot)
+        self._cells.setdefault(_cell(*self._places[slot]), {})[slot] = self._places[slot]
 
     def _new_slot(self) -> int:
         slot = len(self._names)
@@ -124,28 +125,33 @@ class MemoryIndex:
     def found(self, query: LandmarkQuery, *, limit: int | None = None) -> FoundSlots:
         """The landmarks that meet a query, whatever version it names, as a store would answer it; `limit` in the place
         of the query's, if that has none."""
+        if not query.by_distance:
+            return self._by_id(query, query.limit or limit)
         if query.nearest is not None:
             ranked = self._nearest(query, query.nearest)
         elif query.near is not None:
             ranked = self._within(query, query.near, query.near.radius_m)
-        else:
-            ranked = [(0.0, name, slot) for name, slot in self._by_id(query)]
         if query.after is not None:
             mark = (query.after.distance_m or 0.0, query.after.landmark)
             ranked = [one for one in ranked if one[:2] > mark]
         kept = ranked[: query.limit or limit]
         return FoundSlots([one[2] for one in kept], [one[0] for one in kept], len(kept) < len(ranked))
 
-    def _by_id(self, query: LandmarkQuery) -> list[tuple[str, int]]:
-        names = self._names
-        return sorted((names[slot], slot) for slot in self._meeting(query).tolist())
+    def _by_id(self, query: LandmarkQuery, limit: int | None) -> FoundSlots:
+        names, slots = self._names, self._meeting(query)
+        if query.after is not None:
+            mark = query.after.landmark
+            slots = [slot for slot in slots if names[slot] > mark]
+        slots.sort(key=names.__getitem__)
+        kept = slots[:limit]
+        return FoundSlots(kept, (), len(kept) < len(slots))
 
     def _within(self, query: LandmarkQuery, around: Disc, radius_m: float) -> list[tuple[float, str, int]]:
         """What meets the conditions within a radius, in order of distance."""
         slots = self._meeting(query)
         lat_deg, lon_deg = self._numbers[slots, LAT], self._numbers[slots, LON]
         distance_m = geodesic_distances_m(around.lat_deg, around.lon_deg, lat_deg=lat_deg, lon_deg=lon_deg)
-        pairs = zip(distance_m.tolist(), slots.tolist(), strict=True)
+        pairs = zip(distance_m.tolist(), slots, strict=True)
         return sorted((far_m, self._names[slot], slot) for far_m, slot in pairs if far_m <= radius_m)
 
     def _nearest(self, query: LandmarkQuery, place: Nearest) -> list[tuple[float, str, int]]:
@@ -157,16 +163,15 @@ class MemoryIndex:
                 return found[: place.count]
         return self._within(anywhere, around, math.inf)[: place.count]
 
-    def _meeting(self, query: LandmarkQuery) -> Ints:
-        """The slots (n,) that meet every condition but distance, in no order."""
+    def _meeting(self, query: LandmarkQuery) -> list[int]:
+        """The slots that meet every condition but distance, in no order."""
         slots = self._in_area(query)
-        if not (query.kinds or query.max_sigma_m is not None or query.seen is not None or query.vehicle is not None):
-            return slots
-        slots = slots[self._conditions(query, slots)]
+        if query.kinds or query.max_sigma_m is not None or query.seen is not None:
+            among = np.array(slots, dtype=np.int64)
+            slots = among[self._conditions(query, among)].tolist()
         if query.vehicle is None:
             return slots
-        saw = [query.vehicle in self._vehicles[slot] for slot in slots.tolist()]
-        return slots[np.array(saw, dtype=np.bool_)]
+        return [slot for slot in slots if query.vehicle in self._vehicles[slot]]
 
     def _conditions(self, query: LandmarkQuery, slots: Ints) -> Bools:
         numbers, wholes = self._numbers[slots], self._wholes[slots]
@@ -179,19 +184,24 @@ class MemoryIndex:
             meets &= np.isin(wholes[:, KIND], [self._kinds.get(kind, -1) for kind in query.kinds])
         return meets
 
-    def _in_area(self, query: LandmarkQuery) -> Ints:
-        """The slots (n,) inside a query's box; of a disc, those of the cells around it."""
+    def _in_area(self, query: LandmarkQuery) -> list[int]:
+        """The slots inside a query's box; of a disc, those of the cells around it."""
         box, cells = query.bbox, self._cells_around(area_box(query))
         if cells is None:
-            slots = np.flatnonzero(self._held)
-            return slots if box is None else slots[_inside(self._numbers[slots], box)]
-        near: Iterable[int] = chain.from_iterable(cells)
-        if box is not None:
-            places, west, south, east, north = self._places, *_edges(box)
-            near = (slot for slot in near if south <= places[slot][0] <= north and west <= places[slot][1] <= east)
-        return np.fromiter(near, dtype=np.int64)
+            every = np.flatnonzero(self._held)
+            wide: list[int] = (every if box is None else every[_inside(self._numbers[every], box)]).tolist()
+            return wide
+        if box is None:
+            return list(chain.from_iterable(cells))
+        west, south, east, north = box.lon_min_deg, box.lat_min_deg, box.lon_max_deg, box.lat_max_deg
+        return [
+            slot
+            for cell in cells
+            for slot, (lat_deg, lon_deg) in cell.items()
+            if south <= lat_deg <= north and west <= lon_deg <= east
+        ]
 
-    def _cells_around(self, box: DegreeBox | None) -> list[AbstractSet[int]] | None:
+    def _cells_around(self, box: DegreeBox | None) -> list[Mapping[int, Place]] | None:
         """The slots of each cell a box meets; None for more cells than are looked up one by one."""
         if box is None:
             return None
@@ -200,10 +210,6 @@ class MemoryIndex:
             return None
         rows, columns = range(low[0], high[0] + 1), range(low[1], high[1] + 1)
         return [self._cells.get((row, column), NOTHING) for row in rows for column in columns]
-
-
-def _edges(box: DegreeBox) -> tuple[float, float, float, float]:
-    return box.lon_min_deg, box.lat_min_deg, box.lon_max_deg, box.lat_max_deg
 
 
 def _cell(lat_deg: float, lon_deg: float) -> tuple[int, int]:

@@ -81,7 +81,8 @@ class LocalMap:
         self._held, self._assembly = _Held(), StepAssembly()
         self._newest, self._confirmed_s, self._heals = 0, float("-inf"), 0
         self._stop = threading.Event()
-        self._subscriptions = [client.bus.subscribe(expression) for expression in self._expressions()]
+        self._tile_subscriptions: dict[WebTile, Subscription] = {}
+        self._subscriptions = self._subscribed()
         self._thread = threading.Thread(target=self._run, name="local-map", daemon=True)
         self._thread.start()
 
@@ -138,16 +139,16 @@ class LocalMap:
     ) -> None:
         self.close()
 
-    def _expressions(self) -> list[str]:
-        """What is subscribed: versions first in the list."""
-        versions = self._key(VERSION_CHANGE_PATTERN)
+    def _subscribed(self) -> list[Subscription]:
+        """To versions first, and then to tiles: each by itself, or all of them together."""
+        subscribe = self._client.bus.subscribe
+        versions = subscribe(self._key(VERSION_CHANGE_PATTERN))
         if len(self._tiles) > SUBSCRIPTIONS_MOST:
-            return [versions, self._key(TILE_CHANGE_PATTERN, zoom=LANDMARK_ZOOM, column="*", row="*")]
-        tiles = [(tile.zoom, tile.column, tile.row) for tile in self._tiles]
-        return [
-            versions,
-            *(self._key(TILE_CHANGE_PATTERN, zoom=zoom, column=column, row=row) for zoom, column, row in tiles),
-        ]
+            return [versions, subscribe(self._key(TILE_CHANGE_PATTERN, zoom=LANDMARK_ZOOM, column="*", row="*"))]
+        for tile in self._tiles:
+            key = self._key(TILE_CHANGE_PATTERN, zoom=tile.zoom, column=tile.column, row=tile.row)
+            self._tile_subscriptions[tile] = subscribe(key)
+        return [versions, *self._tile_subscriptions.values()]
 
     def _key(self, pattern: str, **chunks: str | int) -> str:
         return map_key(pattern, root=self._client.root, map_name=self._client.map_name, chunks=chunks)
@@ -189,19 +190,32 @@ class LocalMap:
             self._heal()
 
     def _stepped(self, told: VersionChange) -> bool:
-        """Whether everything of a version in the area came; then it is held."""
+        """Whether everything of a version in the area came; then it is held.
+
+        Each subscription has an order of its own: a tile's change may come a moment after its version's.
+        """
         for subscription in self._subscriptions[1:]:
-            self._keep(subscription)
+            while self._keep(subscription.receive(0.0)):
+                pass
+        until_s = self._now_s() + PATIENCE_S
+        for tile in self._assembly.missing(told, self._tiles):
+            subscription = self._tile_subscriptions.get(tile, self._subscriptions[-1])
+            while tile in self._assembly.missing(told, self._tiles):
+                if not self._keep(subscription.receive(max(0.0, until_s - self._now_s()))):
+                    return False
         step = self._assembly.step(told, self._tiles)
         if step is None:
             return False
         self._take(step.map, self._held.landmarks, changed=step.changed, removed=step.removed)
         return True
 
-    def _keep(self, subscription: Subscription) -> None:
-        while (message := subscription.receive(0.0)) is not None:
-            if message.schema_name == TILE_SCHEMA and tile_of_key(message.key) in self._tiles:
-                self._assembly.keep(tile_of_key(message.key), message.payload)
+    def _keep(self, message: BusMessage | None) -> bool:
+        """Whether there was a message; a tile's change is kept until its version is told of."""
+        if message is None:
+            return False
+        if message.schema_name == TILE_SCHEMA and tile_of_key(message.key) in self._tiles:
+            self._assembly.keep(tile_of_key(message.key), message.payload)
+        return True
 
     def _heal(self) -> None:
         """What changed since the version held asked for; all of the area where none is held, or it is too much."""
@@ -221,7 +235,7 @@ class LocalMap:
         rows: list[Landmark] = []
         for page in self._client.pages(LandmarkQuery(bbox=self._box)):
             rows += page.landmarks
-        if page.map.map_version:
+        if page.map.map_version > self.map_version:
             self._heals += 1
             self._take(page.map, {}, changed=rows, removed=())
 

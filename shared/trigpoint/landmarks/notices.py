@@ -84,6 +84,11 @@ class StepAssembly:
         while len(self._tiles) > VERSIONS_WAITING:
             del self._tiles[min(self._tiles)]
 
+    def missing(self, told: VersionChange, followed: frozenset[WebTile]) -> frozenset[WebTile]:
+        """The tiles followed that a version changed, and whose change did not come yet."""
+        there = self._tiles.get(told.map.map_version, {})
+        return ((told.tiles or frozenset()) & followed) - there.keys()
+
     def step(self, told: VersionChange, followed: frozenset[WebTile] | None = None) -> Step | None:
         """The step a version is, in the tiles followed (None: all); None where a tile's change did not come."""
         there = self._tiles.pop(told.map.map_version, {})
