@@ -81,7 +81,7 @@ FLOWS: tuple[Flow, ...] = (
     Flow(WheelPairMeasured, INGEST, (FILTERING, OPTIMISATION, EVALUATION), sender=VEHICLE),
     Flow(ImuMeasured, INGEST, (FILTERING, OPTIMISATION, EVALUATION), sender=VEHICLE),
     Flow(GnssFixReceived, INGEST, (FILTERING, OPTIMISATION, EVALUATION), sender=VEHICLE),
-    Flow(LandmarksDetected, INGEST, (OPTIMISATION, EVALUATION), sender=VEHICLE),
+    Flow(LandmarksDetected, INGEST, (OPTIMISATION, LANDMARKS, EVALUATION), sender=VEHICLE),
     Flow(EventRefused, INGEST, (EVALUATION,)),
     Flow(MapFramePinned, INGEST, (FILTERING, OPTIMISATION, LANDMARKS, EVALUATION)),
     Flow(AnchorLabelled, INGEST, (OPTIMISATION, LANDMARKS, EVALUATION)),

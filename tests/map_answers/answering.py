@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from trigpoint.bus.ports import Bus
 from trigpoint.bus.zenoh_bus import ZenohBus, ZenohSettings
+from trigpoint.events.keys import ASK_PATTERN, map_key
 from trigpoint.landmarks.asked import AnsweredMap, CoverageAnswer, CoverageQuestion
 from trigpoint.landmarks.memory_store import MemoryStore
 from trigpoint.landmarks.ports import LandmarkStore
@@ -62,16 +63,18 @@ def answered(
     coverage: Coverage | None = None,
     settings: AnswerSettings | None = None,
     tells: bool = True,
+    names: tuple[str, str] = (ROOT, MAP),
 ) -> Iterator[AnsweredStore]:
     """The service answering from a store; what is applied through it is told of, if it `tells`."""
     instruments, stop = Instruments("answers"), threading.Event()
     service = MapAnswers(
-        bus, lambda: store, coverage or NothingObserved(), names=(ROOT, MAP), settings=settings, instruments=instruments
+        bus, lambda: store, coverage or NothingObserved(), names=names, settings=settings, instruments=instruments
     )
     thread = threading.Thread(target=service.run, args=(stop,), daemon=True)
-    with ChangeFeed(bus, root=ROOT, map_name=MAP) as feed:
+    key = map_key(ASK_PATTERN, root=names[0], map_name=names[1], chunks={"question": "landmarks"})
+    with ChangeFeed(bus, root=names[0], map_name=names[1]) as feed:
         thread.start()
-        until(lambda: service.ready and bus.await_queryable(KEY, SOON_S))
+        until(lambda: service.ready and bus.await_queryable(key, SOON_S))
         try:
             yield AnsweredStore(FeedingStore(store, feed) if tells else store, store, instruments)
         finally:
