@@ -14,6 +14,7 @@ from figures import (
     faults_log,
     faults_postgis,
     faults_services,
+    http,
     ingest,
     live,
     mrclam,
@@ -44,6 +45,7 @@ GROUPS: Mapping[str, Sequence[Figure]] = {
     "ingest": (*ingest.FIGURES, *projection.FIGURES),
     "live": live.FIGURES,
     "query": query.FIGURES,
+    "http": http.FIGURES,
     "relocalise": relocalise.FIGURES,
     "security": (*security.FIGURES, *security_fuzz.FIGURES),
 }

@@ -35,12 +35,16 @@ def tile_statement(layer: Layer, tile: WebTile, state: MapState, *, as_of: int) 
 def _points(layer: Layer, tile: WebTile, state: MapState, version: str, values: BoundValues) -> str:
     """The points of a tile, each of a crowd's cells as one."""
     columns = ", ".join(name for name in TILE_PROPERTIES[layer.name] if name != LEFT_OUT)
-    area = area_sql(buffered_box(tile), layer, state, values)
+    box = buffered_box(tile)
+    window = indexed_window(box, state)
+    # The window is wide enough for its index to miss none; which of them the tile shows is told by their units.
+    area = area_sql(box, layer, state, values) if window is None else f"geom && {envelope_sql(window, state, values)}"
     found = " UNION ALL ".join(
         f"SELECT {columns}, lon_deg, lat_deg FROM {source.table.name} WHERE {_at(source, version)} AND {area}"
         for source in SOURCES[layer.name]
     )
-    placed = f"SELECT {columns}, {_unit_sql(tile_frame(tile), values)} FROM ({found}) found"
+    # OFFSET 0 keeps the planner from working out every unit anew wherever it is used.
+    placed = f"SELECT {columns}, {_unit_sql(tile_frame(tile), values)} FROM ({found}) found OFFSET 0"
     within = " AND ".join(f"{axis} BETWEEN {-BUFFER} AND {EXTENT + BUFFER - 1}" for axis in ("tx", "ty"))
     inside = f"SELECT * FROM ({placed}) placed WHERE {within}"
     shown = f"SELECT ST_MakePoint(tx, ty) AS geom, {columns}"
