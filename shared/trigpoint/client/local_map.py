@@ -14,7 +14,7 @@ from trigpoint.client.core.constellations import Constellation
 from trigpoint.client.core.known_landmarks import EXPECTED, GnssPrior, area_around
 from trigpoint.client.core.motion_fit import Expectation
 from trigpoint.client.core.relocalisation import Relocalised
-from trigpoint.errors import InputError, MapUnanswered
+from trigpoint.errors import InputError, MapUnanswered, ServiceError
 from trigpoint.events.keys import LANDMARK_ZOOM, TILE_CHANGE_PATTERN, VERSION_CHANGE_PATTERN, map_key
 from trigpoint.geodesy.positions import Wgs84Position
 from trigpoint.geodesy.web_tiles import WebTile, tile_at, tile_edges_deg
@@ -63,7 +63,8 @@ class LocalMap:
 
     Every version's differences are taken in whole, so that a reader sees one version. What was lost is seen in the
     versions that follow, or found by a look every `look_s`, and healed by asking for the changes since the version
-    held. While nobody answers it stays as it is, and says how stale. Raises InputError for an area of too many tiles.
+    held. While nobody answers it stays as it is, and says how stale; so it does for good once its bus is closed.
+    Raises InputError for an area of too many tiles.
     """
 
     def __init__(
@@ -168,6 +169,10 @@ class LocalMap:
             except (MapUnanswered, InputError) as error:
                 logger.warning("the local map stays at version %d for now: %s", self.map_version, error)
                 self._stop.wait(PATIENCE_S)
+            except ServiceError as error:
+                if not self._stop.is_set():
+                    logger.error("the local map stays at version %d for good: %s", self.map_version, error)
+                return
 
     def _look(self) -> None:
         """Whether the version held is the newest, as the service says; if not it is taken in."""

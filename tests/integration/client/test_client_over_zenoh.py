@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from landmark_maps.examples import change, checkpoint, landmark
+from landmark_maps.examples import change, checkpoint, frame, landmark
 from map_answers.answering import MAP, ROOT, SOON_S, AnsweredStore, answered, zenoh_pair
 from trigpoint.bus.memory_bus import MemoryBus
 from trigpoint.client.asking import MapClient
 from trigpoint.client.asking_async import AsyncMapClient
 from trigpoint.client.core.constellations import Constellation
 from trigpoint.client.core.known_landmarks import GnssPrior
+from trigpoint.client.core.placing import VehiclePose
 from trigpoint.client.core.relocalisation import Verdict
 from trigpoint.client.local_map import LocalMap
 from trigpoint.errors import InputError, MapUnanswered
@@ -142,6 +143,23 @@ def test_a_local_map_says_how_stale_it_is_and_stays_while_nobody_answers() -> No
         assert local.await_version(1, SOON_S)
         stale = local.staleness()
         assert (stale.held_version, stale.newest_version, stale.unconfirmed_s < float("inf")) == (1, 1, True)
+
+
+def test_a_local_map_outlives_its_bus_and_stays_as_it_was() -> None:
+    with over_zenoh() as (_, client), LocalMap(client, NEAR, look_s=0.05) as local:
+        assert local.await_version(1, SOON_S)
+        client.bus.close()
+        assert ids(local) == set(ROWS)
+
+
+def test_detections_are_placed_by_the_maps_own_frame() -> None:
+    pose = VehiclePose(T_map_base=np.array([4.0, 3.0, 0.0]), covariance=0.01 * np.eye(3))
+    ahead = Constellation(point_m=np.array([[10.0, 0.0]]), covariance_m2=0.04 * np.eye(2)[None], kind=("pole",))
+    with over_zenoh() as (_, client):
+        found = client.place(ahead, pose)
+    there = landmark("there", 4.0 + 10.0 * frame().point_scale, 3.0)
+    # The same projection on both ways: rounding only, 1e-9 degrees are 0.1 mm.
+    assert (found.lat_deg[0], found.lon_deg[0]) == pytest.approx((there.lat_deg, there.lon_deg), abs=1e-9)
 
 
 def test_a_vehicle_finds_itself_among_landmarks_it_asks_for_and_among_those_held() -> None:
