@@ -33,7 +33,7 @@ def tile_at(position: Wgs84Position, zoom: int) -> WebTile:
 
 
 def corner_of(zoom: int, column: float, row: float) -> tuple[float, float]:
-    """Longitude and latitude in degrees of a place on the tiles' grid; of whole numbers a tile's north-western corner."""
+    """Longitude and latitude in degrees of a place on the tiles' grid; whole numbers: a tile's north-western corner."""
     count = 1 << zoom
     return 360.0 * column / count - 180.0, math.degrees(math.atan(math.sinh(math.pi * (1.0 - 2.0 * row / count))))
 
