@@ -54,7 +54,7 @@ system-tools:
 
 $(INSTALLED): pyproject.toml $(CONSTRAINTS)
 	@bash .ci/environment "$(PYTHON)"
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint $(CONSTRAINTS) --editable .
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint $(CONSTRAINTS) --editable '.[services]'
 	@touch $@
 
 $(DEVELOPED): $(INSTALLED)

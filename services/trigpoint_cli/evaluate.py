@@ -17,6 +17,8 @@ from trigpoint_cli.kept_solves import joint_covariance_m2, kept_solve
 from trigpoint_cli.leave_out import leave_out
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering, metres
 from trigpoint_cli.pipeline import Inputs, filter_drives, read_inputs, settings_for, solve, verdicts_of
+from trigpoint_cli.relocalise import relocalise
+from trigpoint_cli.relocalise_drive import relocalise_drive
 from trigpoint_cli.truth_values import truth_lines, truth_values
 from trigpoint_evaluation.app import Evaluated, evaluate_truth, logged_map, read_truth
 from trigpoint_evaluation.core.gnss import (
@@ -40,6 +42,8 @@ def command() -> None:
 
 
 command.add_command(leave_out)
+command.add_command(relocalise)
+command.add_command(relocalise_drive)
 
 
 @command.command("gnss")

@@ -28,7 +28,8 @@ from trigpoint.errors import InputError
 from trigpoint.observability.log_lines import Secrets
 from trigpoint_filtering.settings import FilterSettings
 from trigpoint_ingest.settings import IngestSettings
-from trigpoint_landmarks.settings import LandmarkSettings
+from trigpoint_landmarks.http.settings import WebSettings
+from trigpoint_landmarks.settings import AnswerSettings, LandmarkSettings
 from trigpoint_optimisation.settings import SolveSettings
 from trigpoint_vehicle.settings import VehicleSettings
 
@@ -51,6 +52,8 @@ class Settings:
     filtering: FilterSettings = field(default_factory=FilterSettings)
     optimisation: SolveSettings = field(default_factory=SolveSettings)
     landmarks: LandmarkSettings = field(default_factory=LandmarkSettings)
+    answers: AnswerSettings = field(default_factory=AnswerSettings)
+    web: WebSettings = field(default_factory=WebSettings)
     vehicle: Annotated[VehicleSettings, ROOT_OF_FLEET] = field(default_factory=VehicleSettings)
     router: RouterSettings = field(default_factory=lambda: ROUTER)
     up: UpSettings = field(default_factory=UpSettings)

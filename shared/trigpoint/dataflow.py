@@ -6,7 +6,14 @@ from typing import TypeVar
 
 from trigpoint.events.corrected import AnchorLabelled, AnchorRetracted, DriveExcluded, DriveIncluded
 from trigpoint.events.estimated import FixJudged, GateAlarmed, PoseFiltered
-from trigpoint.events.keys import KEY_PATTERNS, KEY_VERSION, STREAM_PATTERNS
+from trigpoint.events.keys import (
+    ASK_PATTERN,
+    KEY_PATTERNS,
+    KEY_VERSION,
+    STREAM_PATTERNS,
+    TILE_CHANGE_PATTERN,
+    VERSION_CHANGE_PATTERN,
+)
 from trigpoint.events.mapped import (
     AnchorAssociated,
     ImageOffsetSolved,
@@ -74,7 +81,7 @@ FLOWS: tuple[Flow, ...] = (
     Flow(WheelPairMeasured, INGEST, (FILTERING, OPTIMISATION, EVALUATION), sender=VEHICLE),
     Flow(ImuMeasured, INGEST, (FILTERING, OPTIMISATION, EVALUATION), sender=VEHICLE),
     Flow(GnssFixReceived, INGEST, (FILTERING, OPTIMISATION, EVALUATION), sender=VEHICLE),
-    Flow(LandmarksDetected, INGEST, (OPTIMISATION, EVALUATION), sender=VEHICLE),
+    Flow(LandmarksDetected, INGEST, (OPTIMISATION, LANDMARKS, EVALUATION), sender=VEHICLE),
     Flow(EventRefused, INGEST, (EVALUATION,)),
     Flow(MapFramePinned, INGEST, (FILTERING, OPTIMISATION, LANDMARKS, EVALUATION)),
     Flow(AnchorLabelled, INGEST, (OPTIMISATION, LANDMARKS, EVALUATION)),
@@ -90,6 +97,33 @@ FLOWS: tuple[Flow, ...] = (
     Flow(ImageOffsetSolved, OPTIMISATION, (LANDMARKS, EVALUATION)),
     Flow(MapSolved, OPTIMISATION, (LANDMARKS, EVALUATION)),
     Flow(OdometryCorrected, OPTIMISATION, (VEHICLE,)),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """What a service says over the bus about its projection, without it being an event: it is not in the log.
+
+    `schema` is a Protobuf message's name; `asked_with` names those that ask for it, none if it is told unasked.
+    """
+
+    schema: str
+    writer: str
+    pattern: str
+    asked_with: tuple[str, ...] = ()
+
+    @property
+    def key(self) -> str:
+        """The key's pattern; braces for what each fills in."""
+        return f"{{root}}/{KEY_VERSION}/{self.pattern}"
+
+
+NOTICES: tuple[Notice, ...] = (
+    Notice("trigpoint.v1.TileChanged", LANDMARKS, TILE_CHANGE_PATTERN),
+    Notice("trigpoint.v1.MapChanged", LANDMARKS, VERSION_CHANGE_PATTERN),
+    Notice("trigpoint.v1.LandmarksAnswered", LANDMARKS, ASK_PATTERN, ("trigpoint.v1.LandmarksAsked",)),
+    Notice("trigpoint.v1.ChangesAnswered", LANDMARKS, ASK_PATTERN, ("trigpoint.v1.ChangesAsked",)),
+    Notice("trigpoint.v1.CoverageAnswered", LANDMARKS, ASK_PATTERN, ("trigpoint.v1.CoverageAsked",)),
 )
 
 

@@ -8,7 +8,8 @@ TrigpointError
 │   └── AlignmentRefused  the data cannot fix the map's position or heading
 └── ServiceError          the environment failed: stop the service (exit status 1)
     ├── AppendFailed      an event could not be made durable
-    └── DatabaseUnavailable  the database does not answer, is busy or full: open it anew later
+    ├── DatabaseUnavailable  the database does not answer, is busy or full: open it anew later
+    └── MapUnanswered     nobody answered a question to the map: ask again later
 """
 
 
@@ -51,3 +52,7 @@ class AppendFailed(ServiceError):
 
 class DatabaseUnavailable(ServiceError):
     """The database does not answer, is busy or is full: who can wait opens it anew, and nothing is lost."""
+
+
+class MapUnanswered(ServiceError):
+    """Nobody answered a question to the map in time, or whoever could was busy: it may be asked again later."""

@@ -10,7 +10,10 @@ from types import ModuleType
 import pytest
 
 from trigpoint import dataflow
+from trigpoint.bus import access
+from trigpoint.bus.key_expressions import key_matches
 from trigpoint.events import corrected, estimated, keys, mapped, observed
+from trigpoint_schemas.v1 import asked_pb2
 
 REPOSITORY = Path(__file__).parents[2]
 SERVICES = sorted(path.name for path in (REPOSITORY / "services").iterdir() if path.is_dir())
@@ -76,3 +79,31 @@ def test_the_diagram_names_every_event_and_every_service() -> None:
         name.removeprefix("trigpoint_") for name in dataflow.services() if name != dataflow.CLI
     ]
     assert [name for name in names if name not in diagram] == []
+
+
+def messages_of_questions() -> set[str]:
+    """The messages that travel by themselves: those asked with, answered and told."""
+    named = {notice.schema for notice in dataflow.NOTICES}
+    return named | {schema for notice in dataflow.NOTICES for schema in notice.asked_with}
+
+
+def test_every_notice_is_a_message_of_the_schemas() -> None:
+    there = {f"trigpoint.v1.{name}" for name in asked_pb2.DESCRIPTOR.message_types_by_name}
+    assert messages_of_questions() <= there
+
+
+def test_no_notice_has_the_key_of_an_event() -> None:
+    assert {notice.pattern for notice in dataflow.NOTICES} & set(keys.KEY_PATTERNS.values()) == set()
+
+
+def test_a_notice_may_be_said_where_the_access_rules_let_its_writer() -> None:
+    wild = {"map": "m", "zoom": "16", "column": "1", "row": "2", "question": "landmarks"}
+    refused = [
+        notice.schema
+        for notice in dataflow.NOTICES
+        if not any(
+            key_matches(allowed, notice.pattern.format(**wild))
+            for allowed in (access.ANSWERS.answer if notice.asked_with else access.LANDMARKS.publish)
+        )
+    ]
+    assert refused == []

@@ -50,7 +50,7 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("environment")
     venv.create(folder, with_pip=True)
     pip = (folder / "bin" / "python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check")
-    said_by(*pip, "--constraint", REPOSITORY / "constraints.txt", wheel, folder=folder)
+    said_by(*pip, "--constraint", REPOSITORY / "constraints.txt", f"{wheel}[services]", folder=folder)
     return folder / "bin"
 
 

@@ -10,11 +10,14 @@ from pyogrio import raw as ogr
 from event_examples.one_each import EVENTS
 from event_examples.rows import imu_rows
 from fuzzed_decoders.targets import SCHEMAS
+from question_examples.one_each import TILE_CHANGE, answers, questions
 from trigpoint.bus.attachment import encode_attachment, encode_bundle
 from trigpoint.bus.register import Register, Registration, Role, write_register
 from trigpoint.events.codec import encode
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.observed import ImuMeasured, VehicleDescribed
+from trigpoint.landmarks.messages import encoded_question
+from trigpoint.landmarks.notices import tile_change_bytes
 from trigpoint.logs.vehicle_log import write_vehicle_log
 from trigpoint_vehicle.core.spool_records import SpoolChannel, channel_record, segment_record
 
@@ -41,6 +44,11 @@ def seeds(folder: Path) -> dict[str, tuple[bytes, ...]]:
         "bundle": (_bundle(attachment),),
         "key": (b"fleet/v1/veh/veh-a/up/imu", b"fleet/v1/veh/*/obs/**"),
         "question": (b"\x01151.1,-33.9,151.3,-33.8", b"\x00-33.89,151.19"),
+        "question over the bus": tuple(
+            bytes([number]) + encoded_question(question)[1] for number, question in enumerate(questions())
+        ),
+        "answer over the bus": tuple(bytes([number]) + payload for number, payload in enumerate(answers())),
+        "tile's change": (tile_change_bytes(TILE_CHANGE),),
         "table manifest": (MANIFEST, b"vehicle = " + DEEP, b"vehicle = " + ENDLESS),
         "spool": (_spool(),),
         "log file": (_log_file(folder / "seed.mcap"),),

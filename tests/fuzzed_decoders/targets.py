@@ -14,6 +14,17 @@ from trigpoint.bus.register import read_register
 from trigpoint.configuration.given import from_environment
 from trigpoint.errors import InputError
 from trigpoint.events.codec import decode, encode, event_classes, schema_name
+from trigpoint.geodesy.web_tiles import WebTile
+from trigpoint.landmarks.asked import LandmarkQuestion
+from trigpoint.landmarks.messages import (
+    decoded_change_answer,
+    decoded_coverage_answer,
+    decoded_landmark_answer,
+    decoded_question,
+    decoded_refusal,
+)
+from trigpoint.landmarks.notices import StepAssembly, decoded_version_change
+from trigpoint.landmarks.paging import resumed
 from trigpoint.landmarks.queries import LandmarkQuery, area_box
 from trigpoint.logs.vehicle_log import read_vehicle_log, read_whole_messages
 from trigpoint.logs.verification import verify
@@ -26,6 +37,14 @@ from trigpoint_vehicle.core.table_manifest import parsed_manifest
 MEMORY_FOLDER = Path("/dev/shm")
 SCHEMAS = tuple(schema_name(kind) for kind in event_classes())
 ATTACHMENT_BYTES = 5  # of a bundle
+QUESTIONS = tuple(f"trigpoint.v1.{name}Asked" for name in ("Landmarks", "Changes", "Coverage"))
+ANSWERS: tuple[Callable[[bytes], object], ...] = (
+    decoded_landmark_answer,
+    decoded_change_answer,
+    decoded_coverage_answer,
+    decoded_refusal,
+    decoded_version_change,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,6 +93,24 @@ def _question(data: bytes) -> None:
         area_box(LandmarkQuery(bbox=bbox_of(text)))
     else:
         area_box(LandmarkQuery(near=near_of(text, radius_m=data[0] + 1.0 if data else 1.0)))
+
+
+def _asked(data: bytes) -> None:
+    """The first byte chooses the kind of question; one of landmarks also asks for the page that its token names."""
+    question = decoded_question(QUESTIONS[data[0] % len(QUESTIONS)] if data else "", data[1:])
+    if isinstance(question, LandmarkQuestion) and question.page:
+        resumed(question.query, question.page)
+
+
+def _answered(data: bytes) -> None:
+    """The first byte chooses the kind of answer, or of notice."""
+    read = ANSWERS[data[0] % len(ANSWERS)] if data else decoded_refusal
+    read(data[1:])
+
+
+def _tile_change(data: bytes) -> None:
+    assembly = StepAssembly()
+    assembly.keep(WebTile(16, 1, 1), data)
 
 
 def _manifest(data: bytes) -> None:
@@ -136,6 +173,9 @@ def decoders(folder: Path) -> tuple[Decoder, ...]:
         Decoder(name="bundle", decode=_bundle),
         Decoder(name="key", decode=_key),
         Decoder(name="question", decode=_question),
+        Decoder(name="question over the bus", decode=_asked),
+        Decoder(name="answer over the bus", decode=_answered),
+        Decoder(name="tile's change", decode=_tile_change),
         Decoder(name="table manifest", decode=_manifest),
         Decoder(name="spool", decode=_spool),
         Decoder(name="configuration's words", decode=_configuration_words),

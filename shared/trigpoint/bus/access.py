@@ -90,8 +90,14 @@ OPTIMISATION = Grant(
 LANDMARKS = Grant(
     publish=("map/*/changes/**",),
     listen=("map/**",),
-    answer=("map/**",),
     claim=("live/landmarks/**",),
+    watch=("live/**",),
+    hear_of=("**",),
+)
+ANSWERS = Grant(
+    listen=("map/**",),
+    answer=("map/*/ask/**",),
+    claim=("live/answers/**",),
     watch=("live/**",),
     hear_of=("**",),
 )
@@ -110,7 +116,8 @@ GRANTS: Mapping[Role, Grant] = {
     Role.FILTERING: FILTERING,
     Role.OPTIMISATION: OPTIMISATION,
     Role.LANDMARKS: LANDMARKS,
-    Role.SERVICE: INGEST.joined(FILTERING, OPTIMISATION, LANDMARKS),
+    Role.ANSWERS: ANSWERS,
+    Role.SERVICE: INGEST.joined(FILTERING, OPTIMISATION, LANDMARKS, ANSWERS),
     Role.ROUTER: Grant(everything=("**",)),
 }
 

@@ -1,5 +1,6 @@
 """The bounded queue behind every subscription: it never blocks the transport, and counts what it had to drop."""
 
+import contextlib
 import queue
 import threading
 from typing import Generic, TypeVar
@@ -62,7 +63,14 @@ class Inbox(Generic[ItemT]):
             self._held_bytes -= size_bytes
         return item
 
-    def close(self) -> None:
-        """Nothing more comes in or out; a `take` that waits returns None."""
+    def close(self) -> list[ItemT]:
+        """What was still waiting; nothing more comes in or out, and a `take` that waits returns None."""
         self._closed.set()
+        dropped: list[ItemT] = []
+        with contextlib.suppress(queue.Empty):
+            while True:
+                held = self._items.get_nowait()
+                if held is not None:
+                    dropped.append(held[0])
         self._items.put(None)
+        return dropped

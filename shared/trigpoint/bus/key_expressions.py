@@ -20,6 +20,16 @@ def checked_key(key: str) -> str:
     return key
 
 
+def is_wild(expression: str) -> bool:
+    """Whether an expression may match several keys."""
+    return "*" in expression
+
+
+def expressions_meet(one: str, other: str) -> bool:
+    """Whether a key may match both of two expressions, at least one of them a key."""
+    return key_matches(one, other) if is_wild(one) else key_matches(other, one)
+
+
 def checked_expression(expression: str) -> str:
     """The expression itself, if each chunk is a name, `*` or `**`. Raises InputError otherwise."""
     for chunk in expression.split("/"):

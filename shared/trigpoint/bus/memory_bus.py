@@ -8,7 +8,8 @@ from typing import Self
 from trigpoint.bus.arrivals import run_of_messages
 from trigpoint.bus.inbox import INBOX_CAPACITY, Inbox
 from trigpoint.bus.key_expressions import checked_expression, checked_key, key_matches
-from trigpoint.bus.ports import BusMessage, BusRun
+from trigpoint.bus.memory_queries import MemoryQueryable, MemoryQueryables
+from trigpoint.bus.ports import BusMessage, BusRun, Content, Replies
 from trigpoint.errors import ServiceError
 from trigpoint.events.envelope import EventIdentity
 
@@ -74,6 +75,7 @@ class MemoryExchange:
         self._joined = threading.Condition(self._lock)
         self._subscriptions: tuple[MemorySubscription, ...] = ()
         self._claims: tuple[MemoryClaim, ...] = ()
+        self.queryables = MemoryQueryables()
 
     def hold(self, claim: MemoryClaim) -> None:
         """From now on the claim is seen."""
@@ -117,6 +119,7 @@ class MemoryBus:
         self._exchange = exchange if exchange is not None else MemoryExchange()
         self._capacity = capacity
         self._own: list[MemorySubscription] = []
+        self._queryables: list[MemoryQueryable] = []
         self._claims: list[MemoryClaim] = []
         self._closed = False
 
@@ -169,6 +172,25 @@ class MemoryBus:
         self._exchange.join(subscription)
         return subscription
 
+    def queryable(self, key_expression: str) -> MemoryQueryable:
+        """Queries on all keys the expression matches."""
+        self._require_open()
+        queryables = self._exchange.queryables
+        queryable = MemoryQueryable(checked_expression(key_expression), queryables, self._capacity)
+        self._queryables.append(queryable)
+        queryables.join(queryable)
+        return queryable
+
+    def get(self, key_expression: str, content: Content, *, timeout_s: float) -> Replies:
+        """What the exchange's queryables reply."""
+        self._require_open()
+        return self._exchange.queryables.ask(checked_expression(key_expression), content, timeout_s)
+
+    def await_queryable(self, key: str, timeout_s: float) -> bool:
+        """Whether a queryable of the exchange matches the key, at once or within `timeout_s`."""
+        self._require_open()
+        return self._exchange.queryables.await_one(checked_key(key), timeout_s)
+
     def has_listener(self, key: str) -> bool:
         """Whether a subscription of the exchange matches the key."""
         self._require_open()
@@ -185,6 +207,9 @@ class MemoryBus:
         for subscription in self._own:
             subscription.close()
         self._own.clear()
+        for queryable in self._queryables:
+            queryable.close()
+        self._queryables.clear()
         for claim in self._claims:
             claim.release()
         self._claims.clear()

@@ -8,6 +8,7 @@ from typing import Protocol, Self
 from trigpoint.events.envelope import EventIdentity
 from trigpoint.events.runs import EncodedRun
 
+PROTOBUF = "application/protobuf"
 UNIDENTIFIED = EventIdentity("", "", -1)
 """Identity of a message that came without a readable attachment: its sender does not speak trigpoint."""
 
@@ -33,6 +34,77 @@ class BusRun:
     key: str
     schema_version: int
     run: EncodedRun
+
+
+@dataclass(frozen=True, slots=True)
+class Content:
+    """What a query or a reply says: bytes of a media type, and the Protobuf schema they are in, if they are."""
+
+    payload: bytes
+    schema_name: str = ""
+    media_type: str = PROTOBUF
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """One reply to a query, on a key; a refusal says why there is no other."""
+
+    key: str
+    content: Content
+    refused: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Replies:
+    """What was replied to a query in order of arrival; `whole`: everyone who was asked has finished in time."""
+
+    items: tuple[Reply, ...]
+    whole: bool
+
+
+class Query(Protocol):
+    """A question that waits for replies until it is closed; a context manager, so that it is."""
+
+    @property
+    def key(self) -> str:
+        """The key replies go on: that of the query, or that of the queryable if the query names none."""
+
+    @property
+    def content(self) -> Content:
+        """What is asked."""
+
+    def reply(self, content: Content) -> None:
+        """One more reply. Raises ServiceError where the query or its session is closed."""
+
+    def refuse(self, content: Content) -> None:
+        """Why there is no reply. Raises as `reply` does."""
+
+    def close(self) -> None:
+        """No more replies; again: no effect."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+
+
+class Queryable(Protocol):
+    """Queries that arrived for one key expression, in order of arrival."""
+
+    @property
+    def lost(self) -> int:
+        """How many queries arrived and were closed unanswered because the queue was full; never reset."""
+
+    @property
+    def waiting(self) -> int:
+        """How many queries wait to be received."""
+
+    def receive(self, timeout_s: float) -> Query | None:
+        """The next query, or None if none came within `timeout_s` or the queryable is closed."""
+
+    def close(self) -> None:
+        """No more queries; ones not yet received are closed unanswered."""
 
 
 class Claim(Protocol):
@@ -86,6 +158,18 @@ class Bus(Protocol):
 
         Raises InputError for an expression that is not well formed, ServiceError on a closed bus.
         """
+
+    def queryable(self, key_expression: str) -> Queryable:
+        """Queries on all keys the expression matches, to be answered. Raises as `subscribe` does."""
+
+    def get(self, key_expression: str, content: Content, *, timeout_s: float) -> Replies:
+        """What every queryable that matches replies, as soon as all have finished or `timeout_s` is over.
+
+        Nobody there to answer: no reply at once. Raises as `subscribe` does.
+        """
+
+    def await_queryable(self, key: str, timeout_s: float) -> bool:
+        """Whether a queryable that matches the key is known here now or within `timeout_s`."""
 
     def has_listener(self, key: str) -> bool:
         """Whether a subscription that matches the key is known here now: what is published before is lost."""

@@ -18,13 +18,14 @@ LAYOUT = "trigpoint-register-1"
 
 
 class Role(StrEnum):
-    """What a certificate's owner is; `service` is all four services, for a machine that runs them together."""
+    """What a certificate's owner is; `service` is all of them, for a machine that runs them together."""
 
     VEHICLE = "vehicle"
     INGEST = "ingest"
     FILTERING = "filtering"
     OPTIMISATION = "optimisation"
     LANDMARKS = "landmarks"
+    ANSWERS = "answers"
     SERVICE = "service"
     CLIENT = "client"
     ROUTER = "router"

@@ -15,11 +15,11 @@ from trigpoint.bus.arrivals import Arrival, messages_of, runs_of, runs_of_messag
 from trigpoint.bus.attachment import encode_attachment, encode_bundle, run_attachments
 from trigpoint.bus.inbox import INBOX_BYTES, INBOX_CAPACITY, Inbox
 from trigpoint.bus.key_expressions import checked_expression, checked_key
-from trigpoint.bus.ports import BusMessage, BusRun
+from trigpoint.bus.ports import PROTOBUF, BusMessage, BusRun, Content, Replies
 from trigpoint.bus.tls import TlsFiles, checked_endpoints, tls_values
+from trigpoint.bus.zenoh_queries import ZenohQueryable, encoding_of, replies_to
 from trigpoint.errors import InputError, ServiceError
 
-PROTOBUF = "application/protobuf"
 BUNDLE_COUNT = 256  # messages in a transmission: some 15 kB of IMU, below the 64 kB a Zenoh batch holds
 BUNDLE_BYTES = 64 * 1024  # of payload in a transmission of more than one message
 ARRIVAL_BYTES = 512  # a transmission in memory, besides its payload
@@ -150,6 +150,7 @@ class ZenohBus:
         self._publishers: dict[tuple[str, str], zenoh.Publisher] = {}
         self._subscriptions: list[ZenohSubscription] = []
         self._claims: list[ZenohClaim] = []
+        self._queryables: list[ZenohQueryable] = []
         try:
             self._session = zenoh.open(session_config(settings))
         except zenoh.ZError as error:
@@ -195,7 +196,7 @@ class ZenohBus:
             if found is None:
                 found = self._session.declare_publisher(
                     checked_key(key),
-                    encoding=zenoh.Encoding(PROTOBUF).with_schema(schema_name),
+                    encoding=encoding_of(PROTOBUF, schema_name),
                     congestion_control=zenoh.CongestionControl.BLOCK,
                     reliability=zenoh.Reliability.RELIABLE,
                 )
@@ -209,6 +210,34 @@ class ZenohBus:
         subscription = ZenohSubscription(self._session, checked_expression(key_expression), inbox)
         self._subscriptions.append(subscription)
         return subscription
+
+    def queryable(self, key_expression: str) -> ZenohQueryable:
+        """Queries on all keys the expression matches."""
+        self._require_open()
+        queryable = ZenohQueryable(self._session, checked_expression(key_expression))
+        self._queryables.append(queryable)
+        return queryable
+
+    def get(self, key_expression: str, content: Content, *, timeout_s: float) -> Replies:
+        """What every queryable that matches replies."""
+        self._require_open()
+        try:
+            return replies_to(self._session, checked_expression(key_expression), content, timeout_s=timeout_s)
+        except zenoh.ZError as error:
+            raise ServiceError(f"nothing could be asked on {key_expression}: {error}") from error
+
+    def await_queryable(self, key: str, timeout_s: float) -> bool:
+        """Whether Zenoh knows of a queryable that matches the key, at once or within `timeout_s`."""
+        self._require_open()
+        there = threading.Event()
+        querier = self._session.declare_querier(checked_key(key), target=zenoh.QueryTarget.ALL)
+        changes = querier.declare_matching_listener(lambda status: there.set() if status.matching else None)
+        try:
+            # Typed bool in zenoh 1.10's stubs, in truth a MatchingStatus, which is always true as a condition.
+            return cast(zenoh.MatchingStatus, querier.matching_status).matching or there.wait(timeout_s)
+        finally:
+            changes.undeclare()  # type: ignore[no-untyped-call]
+            querier.undeclare()  # type: ignore[no-untyped-call]
 
     def claim(self, key: str) -> ZenohClaim:
         """The key claimed by a liveliness token: gone when the session's links are."""
@@ -249,6 +278,9 @@ class ZenohBus:
             subscription.close()
         for claim in self._claims:
             claim.release()
+        for queryable in self._queryables:
+            queryable.close()
+        self._queryables.clear()
         self._subscriptions.clear()
         self._claims.clear()
         self._publishers.clear()

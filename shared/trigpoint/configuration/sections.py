@@ -83,6 +83,8 @@ class HttpSettings:
     filtering_port: Port = 9463
     optimisation_port: Port = 9464
     landmarks_port: Port = 9465
+    answers_port: Port = 9466
+    http_port: Port = 9467
     parallel_limit: Annotated[int, Field(ge=1, le=256)] = 8
     request_timeout_s: Seconds = 5.0
 
@@ -102,6 +104,8 @@ class HttpSettings:
             "filtering": self.filtering_port,
             "optimisation": self.optimisation_port,
             "landmarks": self.landmarks_port,
+            "answers": self.answers_port,
+            "http": self.http_port,
         }
 
 
@@ -126,7 +130,7 @@ class TracingSettings:
             raise InputError(f"endpoint {self.endpoint!r}: begins with http:// or https://")
 
 
-ServiceName = Literal["router", "ingest", "filtering", "optimisation", "landmarks"]
+ServiceName = Literal["router", "ingest", "filtering", "optimisation", "landmarks", "answers", "http"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,6 +1,7 @@
 """Where an event goes: its key on the bus and its stream in the log."""
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from trigpoint.errors import InputError
@@ -61,6 +62,10 @@ KEY_PATTERNS: Mapping[type, str] = {
     MapSolved: "map/{map}/version",
     OdometryCorrected: "veh/{vehicle}/corr/odometry",
 }
+
+ASK_PATTERN = "map/{map}/ask/{question}"
+TILE_CHANGE_PATTERN = "map/{map}/changes/{zoom}/{column}/{row}"
+VERSION_CHANGE_PATTERN = "map/{map}/changes/version"
 
 STREAM_PATTERNS: Mapping[type, str] = {
     VehicleDescribed: "veh-{vehicle}",
@@ -133,6 +138,20 @@ def key_expression(event_class: type, *, root: str = DEFAULT_ROOT) -> str:
     """The expression that matches every key of a class of events: `*` for each name."""
     wild = dict.fromkeys(("vehicle", "map", "zoom", "column", "row"), "*")
     return f"{valid_name(root)}/{KEY_VERSION}/{KEY_PATTERNS[event_class].format(**wild)}"
+
+
+def map_key(
+    pattern: str,
+    *,
+    root: str = DEFAULT_ROOT,
+    map_name: str = DEFAULT_MAP,
+    chunks: Mapping[str, str | int] = MappingProxyType({}),
+) -> str:
+    """A key of one map that is no event's: where it is asked, or told of its changes; a chunk `*` matches any.
+
+    Raises InputError for a name that cannot be a chunk of a key.
+    """
+    return f"{valid_name(root)}/{KEY_VERSION}/{pattern.format(map=valid_name(map_name), **chunks)}"
 
 
 def _tile_chunks(landmark: LandmarkSolved, frame: "MapFrame | None") -> dict[str, int]:

@@ -97,6 +97,12 @@ def is_geographic(crs: str) -> bool:
     return bool(_parsed_crs(crs).is_geographic)
 
 
+def is_north_first(crs: str) -> bool:
+    """Whether a CRS's own first axis is that to the north. Raises FrameRefused if it is not known."""
+    axes = _parsed_crs(crs).axis_info
+    return bool(axes) and axes[0].direction == "north"
+
+
 def utm_crs(position: Wgs84Position) -> str:
     """The EPSG name of the UTM zone a position lies in."""
     zone = int(math.floor((position.lon_deg + 180.0) / 6.0)) % 60 + 1

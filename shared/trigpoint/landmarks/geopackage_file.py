@@ -70,6 +70,16 @@ def transaction(connection: Connection) -> Iterator[None]:
 
 
 @contextmanager
+def one_state(driver: sqlite3.Connection) -> Iterator[None]:
+    """All questions inside are answered from one state of the file, whatever another process writes."""
+    driver.execute("BEGIN")
+    try:
+        yield
+    finally:
+        driver.execute("COMMIT")
+
+
+@contextmanager
 def indexed_at_once(driver: sqlite3.Connection, table: str) -> Iterator[None]:
     """Rows inserted inside enter their layer's spatial index together at the end: four times faster than by trigger.
 

@@ -17,36 +17,37 @@ from trigpoint.landmarks.geopackage_file import (
     driver_of,
     indexed_at_once,
     insert_reference,
+    one_state,
     opened,
     transaction,
 )
 from trigpoint.landmarks.geopackage_geometry import decoded_point, encoded_point
 from trigpoint.landmarks.geopackage_query import (
+    ANY_ROW,
     LANDMARK_TABLES,
     WIDEST_INDEXED_DEG,
     MapExtent,
-    QueryShape,
+    Validity,
     bound_box,
+    bound_values,
     clipped,
     grid_window,
     held_extent,
     landmark_sql,
+    query_shape,
 )
 from trigpoint.landmarks.landmark_record import COLUMNS, LandmarkRecord, landmark_of, record_of
 from trigpoint.landmarks.model import Checkpoint, Landmark, LandmarkChanges, MapChange, MapRow, MapVersion
 from trigpoint.landmarks.queries import (
     DegreeBox,
     LandmarkQuery,
-    answered,
     area_box,
-    changes_of,
     require_known_version,
     require_next_version,
 )
+from trigpoint.landmarks.selection import answer_of, changes_of
 
 INSERT_SQL = f"INSERT INTO landmarks ({', '.join(COLUMNS)}) VALUES ({', '.join('?' * len(COLUMNS))})"
-HISTORY_SQL = tuple(f"SELECT {', '.join(COLUMNS)} FROM {one.name} WHERE landmark = ?" for one in LANDMARK_TABLES)
-HISTORY_SQL = tuple(f"SELECT {', '.join(COLUMNS)} FROM {one.name} WHERE landmark = ?" for one in LANDMARK_TABLES)
 HISTORY_SQL = tuple(f"SELECT {', '.join(COLUMNS)} FROM {one.name} WHERE landmark = ?" for one in LANDMARK_TABLES)
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
@@ -86,11 +87,11 @@ class GeoPackageStore:
 
     def landmarks(self, query: LandmarkQuery) -> tuple[Landmark, ...]:
         """The landmarks that meet a query."""
-        with database_errors(self._path):
+        with database_errors(self._path), one_state(self._driver):
             older = query.as_of is not None and self._is_older(query.as_of)
             sources = LANDMARK_TABLES if older else LANDMARK_TABLES[:1]
-            found = [landmark for source in sources for landmark in self._found(source, query, older=older)]
-        return answered(found, query)
+            validity = Validity(valid_at=query.as_of) if older else ANY_ROW
+            return answer_of(lambda asked: self._found_in(sources, asked, validity), query)
 
     def history(self, landmark: str) -> tuple[Landmark, ...]:
         """Every row a landmark has had, in order of version."""
@@ -100,12 +101,30 @@ class GeoPackageStore:
 
     def changes(self, query: LandmarkQuery, *, since: int) -> LandmarkChanges:
         """What changed since a version among the landmarks that meet a query."""
-        return changes_of(self, query, since=since)
+        with database_errors(self._path), one_state(self._driver):
+            return changes_of(self, query, since=since)
+
+    def known_versions(self, around: int) -> tuple[int, ...]:
+        """The numbers of the first version, of this one if it is there, and of the newest, in order."""
+        return tuple(self._connection.scalars(tables.versions_around(around)))
+
+    def ended(self, query: LandmarkQuery, *, since: int, as_of: int) -> list[Landmark]:
+        """Rows valid at version `since`, and not any more at `as_of`."""
+        return self._found_in(LANDMARK_TABLES[1:], query, Validity(valid_at=since, ended_by=as_of))
+
+    def opened(self, query: LandmarkQuery, *, since: int, as_of: int) -> list[Landmark]:
+        """Rows valid at version `as_of`, and not yet at `since`."""
+        return self._found_in(LANDMARK_TABLES, query, Validity(valid_at=as_of, opened_after=since))
 
     def map_versions(self) -> tuple[MapVersion, ...]:
         """All map versions in order."""
         with database_errors(self._path):
             return self._versions()
+
+    def newest_version(self) -> MapVersion | None:
+        """The newest map version."""
+        with database_errors(self._path):
+            return next(iter(self._newest()), None)
 
     def checkpoint(self) -> Checkpoint:
         """How far the log has been taken in."""
@@ -118,7 +137,7 @@ class GeoPackageStore:
         with database_errors(self._path):
             yield from self._versions()
             for source in LANDMARK_TABLES:
-                yield from self._found(source, LandmarkQuery(), older=False)
+                yield from self._found(source, LandmarkQuery(), ANY_ROW)
             yield from map(records.trajectory_of, self._records(tables.trajectories))
             yield from map(records.anchor_of, self._records(tables.anchors))
             yield from map(records.image_offset_of, self._records(tables.image_offsets))
@@ -149,24 +168,21 @@ class GeoPackageStore:
         return tuple(records.map_version_of(dict(record)) for record in found)
 
     def _is_older(self, as_of: int) -> bool:
-        known: tuple[int, ...] = tuple(self._connection.scalars(tables.versions_around(as_of)))
+        known = self.known_versions(as_of)
         require_known_version(as_of, known)
         return as_of < known[-1]
 
-    def _found(self, source: Table, query: LandmarkQuery, *, older: bool) -> Iterable[Landmark]:
-        bound: records.Record = {"kind": query.kind, "as_of": query.as_of, "limit": query.limit}
+    def _found_in(self, sources: Sequence[Table], query: LandmarkQuery, validity: Validity) -> list[Landmark]:
+        return [landmark for source in sources for landmark in self._found(source, query, validity)]
+
+    def _found(self, source: Table, query: LandmarkQuery, validity: Validity) -> Iterable[Landmark]:
+        bound = bound_values(query, validity)
         box = area_box(query)
         window = None
         if box is not None:
             window = self._window(box)
             bound |= bound_box(box) | (window or {})
-        shape = QueryShape(
-            windowed=window is not None,
-            boxed=box is not None,
-            kind=query.kind is not None,
-            as_of=older,
-            limited=query.limit is not None and box is None,
-        )
+        shape = query_shape(query, validity, windowed=window is not None, boxed=box is not None)
         return map(_landmark, self._driver.execute(landmark_sql(source, shape), bound))
 
     def _window(self, box: DegreeBox) -> dict[str, float] | None:

@@ -15,13 +15,8 @@ from trigpoint.landmarks.model import (
     Trajectory,
     valid_at,
 )
-from trigpoint.landmarks.queries import (
-    LandmarkQuery,
-    answered,
-    changes_of,
-    require_known_version,
-    require_next_version,
-)
+from trigpoint.landmarks.queries import LandmarkQuery, require_known_version, require_next_version
+from trigpoint.landmarks.selection import answer_of, changes_of
 
 
 class MemoryStore:
@@ -59,9 +54,9 @@ class MemoryStore:
         """The landmarks that meet a query."""
         held: tuple[Landmark, ...] = tuple(self._valid.values())
         if query.as_of is not None:
-            require_known_version(query.as_of, [version.map_version for version in self._versions])
+            require_known_version(query.as_of, self.known_versions(query.as_of))
             held = tuple(landmark for landmark in held + self._ended if valid_at(landmark, query.as_of))
-        return answered([row for row in held if query.kind in (None, row.kind)], query)
+        return answer_of(lambda _: held, query)
 
     def history(self, landmark: str) -> tuple[Landmark, ...]:
         """Every row a landmark has had, in order of version."""
@@ -71,6 +66,23 @@ class MemoryStore:
     def changes(self, query: LandmarkQuery, *, since: int) -> LandmarkChanges:
         """What changed since a version among the landmarks that meet a query."""
         return changes_of(self, query, since=since)
+
+    def known_versions(self, around: int) -> list[int]:
+        """The numbers of all map versions."""
+        return [version.map_version for version in self._versions]
+
+    def ended(self, query: LandmarkQuery, *, since: int, as_of: int) -> list[Landmark]:
+        """Rows valid at version `since`, and not any more at `as_of`."""
+        return [row for row in self._ended if valid_at(row, since) and not valid_at(row, as_of)]
+
+    def opened(self, query: LandmarkQuery, *, since: int, as_of: int) -> list[Landmark]:
+        """Rows valid at version `as_of`, and not yet at `since`."""
+        rows = (*self._ended, *self._valid.values())
+        return [row for row in rows if valid_at(row, as_of) and not valid_at(row, since)]
+
+    def newest_version(self) -> MapVersion | None:
+        """The newest map version."""
+        return self._versions[-1] if self._versions else None
 
     def map_versions(self) -> tuple[MapVersion, ...]:
         """All map versions in order."""

@@ -31,7 +31,10 @@ class LandmarkStore(Protocol):
         """Every index is there."""
 
     def landmarks(self, query: LandmarkQuery) -> tuple[Landmark, ...]:
-        """The landmarks that meet a query; none while no version is there. Raises InputError for an unknown version."""
+        """The landmarks that meet a query, all of one version; none while no version is there.
+
+        Raises InputError for an unknown version.
+        """
 
     def history(self, landmark: str) -> tuple[Landmark, ...]:
         """Every row a landmark has had, in order of version; none for an id the map never had."""
@@ -39,12 +42,16 @@ class LandmarkStore(Protocol):
     def changes(self, query: LandmarkQuery, *, since: int) -> LandmarkChanges:
         """What changed between version `since` and the query's, among the landmarks that meet the query.
 
-        `removed` are ids that met it at `since` and no longer do. Raises InputError for an unknown version
-        and for a limit, which would make removals of landmarks that are only cut off.
+        `removed` are ids that met it at `since` and no longer do. Raises InputError for an unknown version, for a
+        `since` after the query's version, and for a limit, a page or a number of the nearest, which would make
+        removals of landmarks that are only cut off.
         """
 
     def map_versions(self) -> tuple[MapVersion, ...]:
         """All map versions in order."""
+
+    def newest_version(self) -> MapVersion | None:
+        """The newest map version, None while there is none."""
 
     def checkpoint(self) -> Checkpoint:
         """How far the log has been taken in."""

@@ -1,5 +1,6 @@
 """Landmark queries as SQL on PostGIS: the area by a spatial index, everything else by columns."""
 
+from collections.abc import Iterator
 from functools import lru_cache
 
 import numpy as np
@@ -9,7 +10,15 @@ from sqlalchemy.types import NullType
 
 from trigpoint.geodesy.projection import WGS84, transform_coordinates
 from trigpoint.landmarks import tables
-from trigpoint.landmarks.geopackage_query import WIDEST_INDEXED_DEG, grid_window
+from trigpoint.landmarks.geopackage_query import (
+    ANY_ROW,
+    WIDEST_INDEXED_DEG,
+    Columns,
+    Validity,
+    grid_window,
+    is_limited_by_id,
+    vehicle_item,
+)
 from trigpoint.landmarks.landmark_record import landmark_of
 from trigpoint.landmarks.model import Landmark, MapVersion
 from trigpoint.landmarks.postgis_schema import server_reference_of
@@ -21,11 +30,10 @@ WGS84_SRID = 4326
 
 
 def landmark_statement(
-    source: Table, query: LandmarkQuery, *, version: MapVersion, older: bool
+    source: Table, query: LandmarkQuery, *, version: MapVersion, validity: Validity = ANY_ROW
 ) -> Select[tuple[object, ...]]:
-    """The rows of `landmarks` or `landmark_history` that may meet a query: all that do, and a few that nearly do.
-
-    `version` is any of the map; `older` asks for rows valid at the query's version, not for those of today.
+    """The rows of `landmarks` or `landmark_history` of a validity that may meet a query: all that do, and a few that
+    nearly do. `version` is any of the map.
     """
     columns = source.c
     fields = [column for column in columns if column.name not in ("fid", "geom")]
@@ -38,15 +46,37 @@ def landmark_statement(
     if box is not None:
         statement = statement.where(columns.lat_deg.between(box.lat_min_deg, box.lat_max_deg))
         statement = statement.where(columns.lon_deg.between(box.lon_min_deg, box.lon_max_deg))
-    if query.kind is not None:
-        statement = statement.where(columns.kind == query.kind)
-    if older:
-        ends = columns.valid_to_version
-        statement = statement.where(columns.valid_from_version <= query.as_of)
-        statement = statement.where(or_(ends.is_(None), ends > query.as_of))
-    if query.limit is not None and box is None:
+    statement = statement.where(*_column_conditions(columns, query), *_versions(columns, validity))
+    if is_limited_by_id(query):
         statement = statement.order_by(columns.landmark.collate("C")).limit(query.limit)
     return statement
+
+
+def _column_conditions(columns: Columns, query: LandmarkQuery) -> Iterator[ColumnElement[bool]]:
+    """What a query asks of the columns, area and version left out."""
+    if query.kinds:
+        yield columns.kind.in_(query.kinds)
+    if query.max_sigma_m is not None:
+        yield columns.sigma_major_m <= query.max_sigma_m
+    if query.vehicle is not None:
+        yield func.strpos(columns.vehicles, vehicle_item(query.vehicle)) > 0
+    if query.seen is not None:
+        yield columns.first_seen_ns <= query.seen.last_ns
+        yield columns.last_seen_ns >= query.seen.first_ns
+    if query.after is not None and not query.by_distance:
+        yield columns.landmark.collate("C") > query.after.landmark
+
+
+def _versions(columns: Columns, validity: Validity) -> Iterator[ColumnElement[bool]]:
+    """What a validity asks of the columns."""
+    ends = columns.valid_to_version
+    if validity.valid_at is not None:
+        yield columns.valid_from_version <= validity.valid_at
+        yield or_(ends.is_(None), ends > validity.valid_at)
+    if validity.opened_after is not None:
+        yield columns.valid_from_version > validity.opened_after
+    if validity.ended_by is not None:
+        yield ends <= validity.ended_by
 
 
 def found_landmark(row: Row[tuple[object, ...]]) -> Landmark:

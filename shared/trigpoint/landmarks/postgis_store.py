@@ -9,20 +9,15 @@ from sqlalchemy.exc import DBAPIError
 
 from trigpoint.errors import InputError
 from trigpoint.landmarks import postgis_schema, records, tables
-from trigpoint.landmarks.geopackage_query import LANDMARK_TABLES
+from trigpoint.landmarks.geopackage_query import ANY_ROW, LANDMARK_TABLES, Validity
 from trigpoint.landmarks.landmark_record import COLUMNS
 from trigpoint.landmarks.model import Checkpoint, Landmark, LandmarkChanges, MapChange, MapRow, MapVersion
 from trigpoint.landmarks.net_changes import NetChange, net_change
 from trigpoint.landmarks.postgis_copy import copy_landmarks, copy_records, copy_rows
 from trigpoint.landmarks.postgis_query import found_landmark, landmark_statement
 from trigpoint.landmarks.postgis_session import PostgisSession, driver_of, server_url
-from trigpoint.landmarks.queries import (
-    LandmarkQuery,
-    answered,
-    changes_of,
-    require_known_version,
-    require_next_version,
-)
+from trigpoint.landmarks.queries import LandmarkQuery, require_known_version, require_next_version
+from trigpoint.landmarks.selection import answer_of, changes_of
 
 STREAMED = {"stream_results": True}
 MOVED = ", ".join(name for name in COLUMNS if name != "valid_to_version")
@@ -103,7 +98,7 @@ class PostgisStore:
             versions = _versions(connection)
             found = []
             for source in LANDMARK_TABLES if versions else ():
-                everything = landmark_statement(source, LandmarkQuery(), version=versions[0], older=False)
+                everything = landmark_statement(source, LandmarkQuery(), version=versions[0])
                 own = connection.execute(everything.where(source.c.landmark == landmark))
                 found += [found_landmark(row) for row in own]
         return tuple(sorted(found, key=lambda row: row.valid_from_version))
@@ -118,6 +113,11 @@ class PostgisStore:
         with self._session.transaction() as connection:
             return _versions(connection)
 
+    def newest_version(self) -> MapVersion | None:
+        """The newest map version."""
+        with self._session.transaction() as connection:
+            return next(iter(_newest(connection)), None)
+
     def checkpoint(self) -> Checkpoint:
         """How far the log has been taken in."""
         held = select(tables.checkpoints.c.stream, tables.checkpoints.c.next_number)
@@ -130,7 +130,7 @@ class PostgisStore:
             versions = _versions(connection)
             yield from versions
             for source in LANDMARK_TABLES if versions else ():
-                everything = landmark_statement(source, LandmarkQuery(), version=versions[0], older=False)
+                everything = landmark_statement(source, LandmarkQuery(), version=versions[0])
                 yield from map(found_landmark, connection.execute(everything, execution_options=STREAMED))
             yield from map(records.trajectory_of, _records(connection, tables.trajectories))
             yield from map(records.anchor_of, _records(connection, tables.anchors))
@@ -155,16 +155,19 @@ class PostgisStore:
 
 
 class _OneState:
-    """The answers of one transaction."""
+    """The differing rows of one transaction."""
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
 
-    def landmarks(self, query: LandmarkQuery) -> tuple[Landmark, ...]:
-        return _answered(self._connection, query)
+    def known_versions(self, around: int) -> tuple[int, ...]:
+        return tuple(self._connection.scalars(tables.versions_around(around)))
 
-    def map_versions(self) -> tuple[MapVersion, ...]:
-        return _versions(self._connection)
+    def ended(self, query: LandmarkQuery, *, since: int, as_of: int) -> list[Landmark]:
+        return _found(self._connection, LANDMARK_TABLES[1:], query, Validity(valid_at=since, ended_by=as_of))
+
+    def opened(self, query: LandmarkQuery, *, since: int, as_of: int) -> list[Landmark]:
+        return _found(self._connection, LANDMARK_TABLES, query, Validity(valid_at=as_of, opened_after=since))
 
 
 def _versions(connection: Connection) -> tuple[MapVersion, ...]:
@@ -185,11 +188,20 @@ def _answered(connection: Connection, query: LandmarkQuery) -> tuple[Landmark, .
     if not newest:
         return ()
     older = query.as_of is not None and query.as_of < newest[0].map_version
-    found = []
-    for source in LANDMARK_TABLES if older else LANDMARK_TABLES[:1]:
-        statement = landmark_statement(source, query, version=newest[0], older=older)
-        found += [found_landmark(row) for row in connection.execute(statement)]
-    return answered(found, query)
+    sources = LANDMARK_TABLES if older else LANDMARK_TABLES[:1]
+    validity = Validity(valid_at=query.as_of) if older else ANY_ROW
+    return answer_of(lambda asked: _found(connection, sources, asked, validity), query)
+
+
+def _found(
+    connection: Connection, sources: Sequence[Table], query: LandmarkQuery, validity: Validity
+) -> list[Landmark]:
+    found: list[Landmark] = []
+    for version in _newest(connection):
+        for source in sources:
+            statement = landmark_statement(source, query, version=version, validity=validity)
+            found += [found_landmark(row) for row in connection.execute(statement)]
+    return found
 
 
 def _records(connection: Connection, source: Table) -> Iterator[records.Record]:

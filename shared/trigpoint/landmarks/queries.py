@@ -2,24 +2,39 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Protocol
-
-import numpy as np
+from dataclasses import dataclass
 
 from trigpoint.errors import InputError
-from trigpoint.geodesy.projection import geodesic_distances_m
-from trigpoint.landmarks.model import Landmark, LandmarkChanges, MapVersion, changes_between
+from trigpoint.landmarks.model import MapVersion
 
 METRES_PER_DEGREE = 110_574.0  # of latitude, at the equator, where WGS84 has the fewest; of longitude times cos(lat)
 LAT_LIMIT_DEG = 90.0
 LON_LIMIT_DEG = 180.0
 MAX_RADIUS_M = 100_000.0  # a landmark map is a district's, not a continent's
+NEAREST_MOST = 10_000  # landmarks around one position
+KINDS_MOST = 64  # in one question
+SIGMA_LIMIT_M = 1e6  # beyond it a position says nothing
+WHOLE_LIMIT = 2**63  # of whole numbers: 64 bits hold them in every database
+TEXT_LIMIT = 1000  # characters of a name that is asked for
 
 
 def _require_within(name: str, value: float, limit: float) -> None:
     if not abs(value) <= limit:
         raise InputError(f"{name} {value} is outside -{limit:g} to {limit:g}")
+
+
+def require_whole(name: str, value: int) -> None:
+    """Raises InputError for a number beyond 64 bits."""
+    if not -WHOLE_LIMIT <= value < WHOLE_LIMIT:
+        raise InputError(f"{name} {value} is outside -2^63 to 2^63 - 1")
+
+
+def _require_text(name: str, text: str, *, least: int = 1) -> None:
+    """Raises InputError for a text that no database holds."""
+    if not least <= len(text) <= TEXT_LIMIT:
+        raise InputError(f"{name} has {len(text)} characters: {least} to {TEXT_LIMIT} are allowed")
+    if any(character == "\0" or "\ud800" <= character <= "\udfff" for character in text):
+        raise InputError(f"{name} {text!r} holds a character that no database keeps")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,22 +77,95 @@ class Disc:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LandmarkQuery:
-    """Which landmarks are asked for: all conditions hold together; None asks for anything.
+class Nearest:
+    """The `count` landmarks nearest to a position, however far. Raises InputError if it is none, or too many."""
 
-    `as_of` is a map version, None the newest. With `near` the answer is in order of distance, else of id;
-    `limit` keeps its beginning. Raises InputError for a limit under 1.
+    lat_deg: float
+    lon_deg: float
+    count: int
+
+    def __post_init__(self) -> None:
+        _require_within("latitude", self.lat_deg, LAT_LIMIT_DEG)
+        _require_within("longitude", self.lon_deg, LON_LIMIT_DEG)
+        if not 1 <= self.count <= NEAREST_MOST:
+            raise InputError(f"nearest {self.count} is outside 1 to {NEAREST_MOST}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimeSpan:
+    """From one time to another in nanoseconds since 1970, both included. Raises InputError if it is inverted."""
+
+    first_ns: int
+    last_ns: int
+
+    def __post_init__(self) -> None:
+        for name, value_ns in (("first_ns", self.first_ns), ("last_ns", self.last_ns)):
+            require_whole(name, value_ns)
+        if self.first_ns > self.last_ns:
+            raise InputError(f"time span is inverted: first_ns {self.first_ns} is after last_ns {self.last_ns}")
+
+    def meets(self, first_ns: int, last_ns: int) -> bool:
+        """Whether another span, both ends included, has a moment in common."""
+        return first_ns <= self.last_ns and self.first_ns <= last_ns
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PageMark:
+    """The last landmark of a page, in the order of its answer: by distance where that is asked for, else by id.
+
+    Raises InputError for an id no database keeps, and a distance that is none.
+    """
+
+    landmark: str
+    distance_m: float | None = None
+
+    def __post_init__(self) -> None:
+        _require_text("landmark", self.landmark)
+        if self.distance_m is not None and not 0.0 <= self.distance_m < math.inf:
+            raise InputError(f"distance {self.distance_m} m is outside 0 to infinity")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LandmarkQuery:
+    """Which landmarks are asked for: all conditions hold together; None, or no kind, asks for anything.
+
+    `kinds`: one of them. `max_sigma_m`: semi-major axis of the 1-sigma ellipse at most. `vehicle`: one that saw it.
+    `seen`: the span from its first to its last sighting meets this one. `as_of` is a map version, None the newest.
+    With `near` or `nearest` the answer is in order of distance, else of id; it begins after `after`, and `limit`
+    keeps its beginning. Raises InputError for a value outside its limits.
     """
 
     bbox: DegreeBox | None = None
     near: Disc | None = None
-    kind: str | None = None
+    nearest: Nearest | None = None
+    kinds: tuple[str, ...] = ()
+    max_sigma_m: float | None = None
+    vehicle: str | None = None
+    seen: TimeSpan | None = None
     as_of: int | None = None
     limit: int | None = None
+    after: PageMark | None = None
 
     def __post_init__(self) -> None:
         if self.limit is not None and self.limit < 1:
             raise InputError(f"limit {self.limit} is under 1")
+        if self.near is not None and self.nearest is not None:
+            raise InputError("near and nearest are both asked for: one of them")
+        if len(self.kinds) > KINDS_MOST:
+            raise InputError(f"{len(self.kinds)} kinds are asked for: at most {KINDS_MOST}")
+        if self.max_sigma_m is not None and not 0.0 < self.max_sigma_m <= SIGMA_LIMIT_M:
+            raise InputError(f"max_sigma_m {self.max_sigma_m} is outside 0 to {SIGMA_LIMIT_M:g} m")
+        if self.as_of is not None:
+            require_whole("as_of", self.as_of)
+        for kind in self.kinds:
+            _require_text("kind", kind, least=0)
+        if self.vehicle is not None:
+            _require_text("vehicle", self.vehicle)
+
+    @property
+    def by_distance(self) -> bool:
+        """Whether the answer is in order of distance."""
+        return self.near is not None or self.nearest is not None
 
 
 def box_around(disc: Disc) -> DegreeBox:
@@ -104,52 +192,6 @@ def area_box(query: LandmarkQuery) -> DegreeBox | None:
         return around
     narrow = around.lon_max_deg - around.lon_min_deg < query.bbox.lon_max_deg - query.bbox.lon_min_deg
     return around if narrow else query.bbox
-
-
-def answered(found: Sequence[Landmark], query: LandmarkQuery) -> tuple[Landmark, ...]:
-    """The answer to a query from landmarks that meet its kind and version, and its area at least nearly."""
-    boxed = [landmark for landmark in found if query.bbox is None or _inside(landmark, query.bbox)]
-    if query.near is None:
-        ordered = sorted(boxed, key=lambda landmark: landmark.landmark)
-    else:
-        ordered = _nearest_within(boxed, query.near)
-    return tuple(ordered[: query.limit])
-
-
-def _inside(landmark: Landmark, bbox: DegreeBox) -> bool:
-    return bbox.contains(landmark.lat_deg, landmark.lon_deg)
-
-
-def _nearest_within(landmarks: list[Landmark], disc: Disc) -> list[Landmark]:
-    """Those inside the disc, nearest first, then by id."""
-    if not landmarks:
-        return []
-    distance_m = geodesic_distances_m(
-        disc.lat_deg,
-        disc.lon_deg,
-        lat_deg=np.array([landmark.lat_deg for landmark in landmarks]),
-        lon_deg=np.array([landmark.lon_deg for landmark in landmarks]),
-    )
-    inside = [pair for pair in zip(distance_m.tolist(), landmarks, strict=True) if pair[0] <= disc.radius_m]
-    return [landmark for _, landmark in sorted(inside, key=lambda pair: (pair[0], pair[1].landmark))]
-
-
-class _Answering(Protocol):
-    def landmarks(self, query: LandmarkQuery) -> tuple[Landmark, ...]: ...
-
-    def map_versions(self) -> tuple[MapVersion, ...]: ...
-
-
-def changes_of(store: _Answering, query: LandmarkQuery, *, since: int) -> LandmarkChanges:
-    """The changes a store answers, from its two answers to the query. Raises InputError as `LandmarkStore.changes`."""
-    if query.limit is not None:
-        raise InputError(f"limit {query.limit} cannot go with changes since version {since}: they are whole or wrong")
-    known = tuple(version.map_version for version in store.map_versions())
-    require_known_version(since, known)
-    as_of = known[-1] if query.as_of is None else query.as_of
-    before = store.landmarks(replace(query, as_of=since))
-    after = store.landmarks(replace(query, as_of=as_of))
-    return changes_between(before, after, since=since, as_of=as_of)
 
 
 def require_known_version(map_version: int, known: Sequence[int]) -> None:

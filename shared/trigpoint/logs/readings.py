@@ -49,6 +49,16 @@ def vehicle_streams(log: EventLog) -> tuple[str, ...]:
     return tuple(stream for stream in log.streams() if stream.startswith(VEHICLE_PREFIX))
 
 
+def drives_of_vehicle(log: EventLog, vehicle: str) -> tuple[Drive, ...]:
+    """A vehicle's drives, excluded ones too. Raises InputError where there is none, naming those that have some."""
+    streams = vehicle_streams(log)
+    if f"{VEHICLE_PREFIX}{vehicle}" not in streams:
+        known = ", ".join(stream.removeprefix(VEHICLE_PREFIX) for stream in streams) or "none"
+        raise InputError(f"vehicle {vehicle!r} has no drive in the log; these have: {known}")
+    rows = log.read(f"{VEHICLE_PREFIX}{vehicle}")
+    return drives_of([cast(Envelope[Observed], row.envelope) for row in rows])
+
+
 def logged_drives(log: EventLog, *, progress: Progress = in_silence) -> tuple[Drive, ...]:
     """Every drive in the log that is not excluded. Raises InputError where there is none."""
     streams, excluded = vehicle_streams(log), excluded_drives(logged_corrections(log))

@@ -37,6 +37,7 @@ class Instruments:
         self.bus_lost = self._counter("bus_lost", "Messages dropped because a queue was full.")
         self.restarts = self._counter("restarts", "Times a supervised service was started anew.", "name")
         self.refused_access = self._counter("refused_access", "Sessions or messages refused by access control.")
+        self.answers = self._counter("answers", "Questions answered.")
         self.queue_depth = self._gauge("queue_depth", "Messages that wait to be worked on.")
         self.projection_lag_events = self._gauge("projection_lag_events", "Events in the log not yet taken in.")
         self.projection_lag_seconds = self._gauge("projection_lag_seconds", "Age of the oldest one not yet taken in.")
@@ -45,6 +46,7 @@ class Instruments:
         self.fsync_seconds = self._histogram("fsync_seconds", "Durations of making a group of events durable.")
         self.update_seconds = self._histogram("update_seconds", "Durations of incremental updates.")
         self.solve_seconds = self._histogram("solve_seconds", "Durations of whole solves.")
+        self.answer_seconds = self._histogram("answer_seconds", "Durations of answering a question.")
         self.projection_seconds = self._histogram("projection_seconds", "Durations of transactions of a projection.")
 
     def _counter(self, name: str, text: str, *labels: str) -> Counter:

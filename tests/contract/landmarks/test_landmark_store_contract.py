@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 
 from landmark_maps import examples
-from landmark_maps.examples import change, checkpoint, landmark
+from landmark_maps.examples import SECOND_NS, START_NS, change, checkpoint, landmark
 from trigpoint.errors import InputError
 from trigpoint.landmarks.geopackage_store import GeoPackageStore
 from trigpoint.landmarks.memory_store import MemoryStore
 from trigpoint.landmarks.model import Anchor, Checkpoint, Landmark, LandmarkChanges
+from trigpoint.landmarks.paging import LandmarkPage, page_of
 from trigpoint.landmarks.ports import LandmarkStore
 from trigpoint.landmarks.postgis_store import PostgisStore
-from trigpoint.landmarks.queries import DegreeBox, Disc, LandmarkQuery
+from trigpoint.landmarks.queries import DegreeBox, Disc, LandmarkQuery, Nearest, PageMark, TimeSpan
 
 EVERYWHERE = DegreeBox(lon_min_deg=-180.0, lat_min_deg=-90.0, lon_max_deg=180.0, lat_max_deg=90.0)
 
@@ -164,13 +165,13 @@ def test_a_limit_without_an_area_keeps_the_first_ids(moved: LandmarkStore) -> No
 
 
 def test_a_kind_is_asked_for_by_name(moved: LandmarkStore) -> None:
-    assert ids(moved.landmarks(LandmarkQuery(kind="corner"))) == ["C"]
+    assert ids(moved.landmarks(LandmarkQuery(kinds=("corner",)))) == ["C"]
 
 
 def test_conditions_hold_together(moved: LandmarkStore) -> None:
     here = landmark("here", 0.0, 0.0)
     disc = Disc(lat_deg=here.lat_deg, lon_deg=here.lon_deg, radius_m=500.0)
-    query = LandmarkQuery(bbox=box_of(-50.0, -50.0, 50.0, 150.0), near=disc, kind="pole", as_of=2)
+    query = LandmarkQuery(bbox=box_of(-50.0, -50.0, 50.0, 150.0), near=disc, kinds=("pole",), as_of=2)
     assert ids(moved.landmarks(query)) == ["A"]
 
 
@@ -339,19 +340,139 @@ def crowd(store: LandmarkStore) -> tuple[LandmarkStore, MemoryStore]:
 
 
 @pytest.mark.parametrize("as_of", [None, 1])
-@pytest.mark.parametrize("kind", [None, "corner"])
+@pytest.mark.parametrize("kinds", [(), ("corner",)])
 @pytest.mark.parametrize("limit", [None, 7])
 @pytest.mark.parametrize("area", ["bbox", "near", "both"])
 def test_every_store_answers_as_memory_does(
-    crowd: tuple[LandmarkStore, MemoryStore], as_of: int | None, kind: str | None, limit: int | None, area: str
+    crowd: tuple[LandmarkStore, MemoryStore], as_of: int | None, kinds: tuple[str, ...], limit: int | None, area: str
 ) -> None:
     here = landmark("here", 123.0, -45.0)
     query = LandmarkQuery(
         bbox=None if area == "near" else box_of(-300.0, -400.0, 500.0, 600.0),
         near=None if area == "bbox" else Disc(lat_deg=here.lat_deg, lon_deg=here.lon_deg, radius_m=350.0),
-        kind=kind,
+        kinds=kinds,
         as_of=as_of,
         limit=limit,
     )
     store, twin = crowd
     assert store.landmarks(query) == twin.landmarks(query) != ()
+
+
+HERE = landmark("here", 123.0, -45.0)
+NEAREST = Nearest(lat_deg=HERE.lat_deg, lon_deg=HERE.lon_deg, count=40)
+AROUND = Disc(lat_deg=HERE.lat_deg, lon_deg=HERE.lon_deg, radius_m=350.0)
+MORNING = TimeSpan(first_ns=START_NS + 100 * SECOND_NS, last_ns=START_NS + 200 * SECOND_NS)
+
+
+@pytest.fixture
+def varied(store: LandmarkStore) -> tuple[LandmarkStore, MemoryStore]:
+    """200 landmarks of different certainty, vehicles and times, a quarter of them moved in version 2; and in memory."""
+    numbers = np.random.default_rng(6)
+    at_m = numbers.uniform(-1000.0, 1000.0, (250, 2)).tolist()
+    rows = [
+        replace(
+            landmark(f"L{n}", *at_m[n], kind=("pole", "corner", "")[n % 3]),
+            sigma_major_m=0.1 + 0.01 * (n % 20),
+            vehicles=(("veh-a",), ('veh "b"',), ("veh-a", "ö, veh-c"), ())[n % 4],
+            first_seen_ns=START_NS + n * SECOND_NS,
+            last_seen_ns=START_NS + (n + n % 60) * SECOND_NS,
+        )
+        for n in range(200)
+    ]
+    again = [replace(landmark(f"L{4 * n}", *at_m[200 + n]), observation_count=99) for n in range(50)]
+    twin = MemoryStore()
+    for one in (store, twin):
+        one.apply(change(1, opened=rows), checkpoint(1))
+        one.apply(change(2, opened=again, closed=[row.landmark for row in again]), checkpoint(2))
+    return store, twin
+
+
+CONDITIONS = {
+    "kinds": LandmarkQuery(kinds=("pole", "")),
+    "certain": LandmarkQuery(max_sigma_m=0.15),
+    "vehicle": LandmarkQuery(vehicle='veh "b"'),
+    "vehicle limited": LandmarkQuery(vehicle="veh-a", limit=9),
+    "seen": LandmarkQuery(seen=MORNING),
+    "nearest": LandmarkQuery(nearest=NEAREST),
+    "nearest of a kind": LandmarkQuery(nearest=NEAREST, kinds=("corner",), limit=7),
+    "nearest in a box": LandmarkQuery(nearest=NEAREST, bbox=box_of(-300.0, -400.0, 500.0, 600.0)),
+    "more than there are": LandmarkQuery(nearest=replace(NEAREST, count=1_000), max_sigma_m=0.12),
+    "together": LandmarkQuery(near=AROUND, kinds=("pole",), max_sigma_m=0.25, vehicle="veh-a", seen=MORNING),
+    "after an id": LandmarkQuery(after=PageMark(landmark="L17"), limit=30),
+    "after an id in a box": LandmarkQuery(bbox=box_of(-900.0, -900.0, 500.0, 600.0), after=PageMark(landmark="L17")),
+    "after a distance": LandmarkQuery(near=AROUND, after=PageMark(landmark="L0", distance_m=200.0)),
+}
+
+
+@pytest.mark.parametrize("as_of", [None, 1])
+@pytest.mark.parametrize("name", CONDITIONS)
+def test_every_store_answers_every_condition_as_memory_does(
+    varied: tuple[LandmarkStore, MemoryStore], name: str, as_of: int | None
+) -> None:
+    store, twin = varied
+    query = replace(CONDITIONS[name], as_of=as_of)
+    assert store.landmarks(query) == twin.landmarks(query) != ()
+
+
+@pytest.mark.parametrize("name", ["kinds", "certain", "vehicle", "seen", "together"])
+def test_every_store_tells_changes_as_memory_does(varied: tuple[LandmarkStore, MemoryStore], name: str) -> None:
+    store, twin = varied
+    query = CONDITIONS[name]
+    assert store.changes(query, since=1) == twin.changes(query, since=1)
+
+
+def test_nearest_are_as_many_as_asked_for_in_order_of_distance(varied: tuple[LandmarkStore, MemoryStore]) -> None:
+    found = varied[0].landmarks(LandmarkQuery(nearest=NEAREST, as_of=1))
+    everything = varied[0].landmarks(LandmarkQuery(near=replace(AROUND, radius_m=5_000.0), as_of=1))
+    assert (len(found), found) == (40, everything[:40])
+
+
+def test_a_vehicle_whose_name_stands_inside_anothers_saw_nothing(varied: tuple[LandmarkStore, MemoryStore]) -> None:
+    assert varied[0].landmarks(LandmarkQuery(vehicle="b")) == ()
+
+
+def test_changes_backwards_are_refused(moved: LandmarkStore) -> None:
+    with pytest.raises(InputError, match="changes since version 3 up to 2: the first has to be the older one"):
+        moved.changes(LandmarkQuery(as_of=2), since=3)
+
+
+def test_changes_among_the_nearest_are_refused(moved: LandmarkStore) -> None:
+    with pytest.raises(InputError, match="nearest .* cannot go with changes since version 1"):
+        moved.changes(LandmarkQuery(nearest=NEAREST), since=1)
+
+
+def test_the_newest_version_is_known(moved: LandmarkStore) -> None:
+    assert moved.newest_version() == moved.map_versions()[-1]
+
+
+def test_an_empty_store_has_no_newest_version(store: LandmarkStore) -> None:
+    assert store.newest_version() is None
+
+
+def pages(store: LandmarkStore, query: LandmarkQuery) -> list[LandmarkPage]:
+    """All pages of an answer."""
+    found = [page_of(store, query)]
+    while found[-1].next_page:
+        found.append(page_of(store, query, token=found[-1].next_page))
+    return found
+
+
+@pytest.mark.parametrize("name", CONDITIONS)
+def test_the_pages_of_an_answer_are_the_answer(varied: tuple[LandmarkStore, MemoryStore], name: str) -> None:
+    query = replace(CONDITIONS[name], limit=None, after=None)
+    whole = varied[0].landmarks(query)
+    found = pages(varied[0], replace(query, limit=7))
+    assert [row for page in found for row in page.landmarks] == list(whole)
+    assert {len(page.landmarks) for page in found[:-1]} <= {7}
+
+
+def test_pages_stay_in_the_version_of_the_first(varied: tuple[LandmarkStore, MemoryStore]) -> None:
+    store, query = varied[0], LandmarkQuery(limit=150)
+    first = page_of(store, query)
+    store.apply(change(3, closed=[row.landmark for row in store.landmarks(LandmarkQuery())]), checkpoint(3))
+    second = page_of(store, query, token=first.next_page)
+    assert (first.map_version, second.map_version, len(second.landmarks)) == (2, 2, 50)
+
+
+def test_an_empty_store_has_one_empty_page_of_no_version(store: LandmarkStore) -> None:
+    assert page_of(store, LandmarkQuery(limit=5)) == LandmarkPage(map_version=0, landmarks=(), next_page="")

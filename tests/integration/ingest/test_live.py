@@ -13,7 +13,7 @@ from typing import Self
 import pytest
 
 from trigpoint.bus.memory_bus import MemoryBus, MemoryExchange
-from trigpoint.bus.ports import Bus, BusMessage, BusRun, Claim, Subscription
+from trigpoint.bus.ports import Bus, BusMessage, BusRun, Claim, Content, Queryable, Replies, Subscription
 from trigpoint.bus.zenoh_bus import ZenohBus, ZenohSettings
 from trigpoint.errors import AppendFailed, LogDamaged, ServiceError
 from trigpoint.events.envelope import Envelope, EventIdentity, LogPosition
@@ -82,6 +82,15 @@ class LossyBus:
 
     def await_listener(self, key: str, timeout_s: float) -> bool:
         return self._bus.await_listener(key, timeout_s)
+
+    def queryable(self, key_expression: str) -> Queryable:
+        return self._bus.queryable(key_expression)
+
+    def get(self, key_expression: str, content: Content, *, timeout_s: float) -> Replies:
+        return self._bus.get(key_expression, content, timeout_s=timeout_s)
+
+    def await_queryable(self, key: str, timeout_s: float) -> bool:
+        return self._bus.await_queryable(key, timeout_s)
 
     def close(self) -> None:
         self._bus.close()

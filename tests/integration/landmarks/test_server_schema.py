@@ -140,7 +140,7 @@ def test_a_reader_in_the_way_leaves_the_indexes_as_they_are(made: str) -> None:
 
 def plan_of(url: str, source: Table, query: LandmarkQuery) -> str:
     """How the server would look a query up, were the table too large to be read through."""
-    statement = landmark_statement(source, query, version=version_row(), older=False)
+    statement = landmark_statement(source, query, version=version_row())
     engine = create_engine(url)
     with engine.connect() as connection:
         connection.execute(text("SET enable_seqscan = off"))

@@ -73,9 +73,10 @@ def test_what_a_vehicle_reads_beside_its_own_is_what_a_client_reads() -> None:
     assert client.publish == ()
 
 
-def test_the_role_of_all_services_is_the_four_together() -> None:
-    four = [GRANTS[role] for role in (Role.INGEST, Role.FILTERING, Role.OPTIMISATION, Role.LANDMARKS)]
-    assert GRANTS[Role.SERVICE] == Grant().joined(*four)
+def test_the_role_of_all_services_is_all_of_them_together() -> None:
+    all_of_them = (Role.INGEST, Role.FILTERING, Role.OPTIMISATION, Role.LANDMARKS, Role.ANSWERS)
+    single = [GRANTS[role] for role in all_of_them]
+    assert GRANTS[Role.SERVICE] == Grant().joined(*single)
 
 
 def test_rules_name_the_certificate_and_deny_what_is_not_named() -> None:

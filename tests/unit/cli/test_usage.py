@@ -141,3 +141,21 @@ def test_near_without_a_radius_is_refused(tmp_path: Path) -> None:
 
 def test_without_debug_no_traceback_is_shown(tmp_path: Path) -> None:
     assert "Traceback" not in trigpoint("build", "--data", tmp_path).err
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (("--nearest", "3"), "go with --near"),
+        (("--near", "0,0", "--nearest", "3", "--radius-m", "5"), "one of the two is needed"),
+        (("--near", "0,0", "--nearest", "0"), "nearest 0 is outside 1 to 10000"),
+        (("--seen", "yesterday"), "is not FIRST_NS,LAST_NS"),
+        (("--max-sigma-m", "-1"), "max_sigma_m -1.0 is outside"),
+    ],
+)
+def test_conditions_that_say_nothing_are_refused_with_what_is_needed(
+    words: tuple[str, ...], reason: str, tmp_path: Path
+) -> None:
+    said = trigpoint("landmarks", "--data", tmp_path, *words, "--json")
+    assert said.status == 2
+    assert reason in said.answer["error"]

@@ -6,9 +6,9 @@ import pytest
 
 from landmark_maps.examples import landmark
 from trigpoint.errors import InputError
+from trigpoint.landmarks.geojson import change_list, feature_collection, landmark_list
 from trigpoint.landmarks.model import LandmarkChanges
 from trigpoint_landmarks.core.questions import bbox_of, near_of
-from trigpoint_landmarks.core.rendering import change_list, feature_collection, landmark_list
 
 
 def test_a_bbox_is_longitude_first() -> None:

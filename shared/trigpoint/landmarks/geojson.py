@@ -1,4 +1,4 @@
-"""Landmarks as JSON and as GeoJSON (RFC 7946): plain values, ready for a JSON encoder."""
+"""Landmarks as JSON and as GeoJSON (RFC 7946): plain values, ready for a JSON encoder; the same keys everywhere."""
 
 from collections.abc import Sequence
 
@@ -8,6 +8,7 @@ DEGREE_DECIMALS = 9  # 0.1 mm on the ground
 METRE_DECIMALS = 4
 
 JsonObject = dict[str, object]
+Coordinates = tuple[float, float]
 
 
 def feature_collection(landmarks: Sequence[Landmark], *, map_version: int | None) -> JsonObject:
@@ -15,36 +16,35 @@ def feature_collection(landmarks: Sequence[Landmark], *, map_version: int | None
     return {
         "type": "FeatureCollection",
         "map_version": map_version,
-        "features": [_feature(landmark) for landmark in landmarks],
+        "features": [landmark_feature(landmark) for landmark in landmarks],
+    }
+
+
+def landmark_feature(landmark: Landmark, *, coordinates: Coordinates | None = None) -> JsonObject:
+    """The landmark as a GeoJSON Feature at `coordinates` (x or longitude first), if not in WGS84 degrees."""
+    wgs84 = (round(landmark.lon_deg, DEGREE_DECIMALS), round(landmark.lat_deg, DEGREE_DECIMALS))
+    return {
+        "type": "Feature",
+        "id": landmark.landmark,
+        "geometry": {"type": "Point", "coordinates": list(coordinates or wgs84)},
+        "properties": landmark_properties(landmark),
     }
 
 
 def landmark_list(landmarks: Sequence[Landmark], *, map_version: int | None) -> JsonObject:
     """The landmarks as one JSON object: {map_version, landmarks: {count, items}}."""
-    items = [_position(landmark) | _properties(landmark) for landmark in landmarks]
+    items = [_position(landmark) | landmark_properties(landmark) for landmark in landmarks]
     return {"map_version": map_version, "landmarks": {"count": len(items), "items": items}}
 
 
 def change_list(changes: LandmarkChanges) -> JsonObject:
     """What changed since a version: {since, map_version, changed: {count, items}, removed: {count, items}}."""
-    items = [_position(landmark) | _properties(landmark) for landmark in changes.changed]
+    items = [_position(landmark) | landmark_properties(landmark) for landmark in changes.changed]
     return {
         "since": changes.since,
         "map_version": changes.as_of,
         "changed": {"count": len(items), "items": items},
         "removed": {"count": len(changes.removed), "items": list(changes.removed)},
-    }
-
-
-def _feature(landmark: Landmark) -> JsonObject:
-    return {
-        "type": "Feature",
-        "id": landmark.landmark,
-        "geometry": {
-            "type": "Point",
-            "coordinates": [round(landmark.lon_deg, DEGREE_DECIMALS), round(landmark.lat_deg, DEGREE_DECIMALS)],
-        },
-        "properties": _properties(landmark),
     }
 
 
@@ -55,7 +55,8 @@ def _position(landmark: Landmark) -> JsonObject:
     }
 
 
-def _properties(landmark: Landmark) -> JsonObject:
+def landmark_properties(landmark: Landmark) -> JsonObject:
+    """What is said of a landmark besides where it is in degrees; each quantity's key ends with its unit."""
     return {
         "landmark": landmark.landmark,
         "kind": landmark.kind,

@@ -1,0 +1,135 @@
+"""The HTTP service at work: an event loop of its own, until it is told to stop."""
+
+import asyncio
+import logging
+import socket
+import threading
+from collections.abc import Callable
+
+import uvicorn
+import uvloop
+
+from trigpoint.bus.ports import Bus, Subscription
+from trigpoint.errors import ServiceError
+from trigpoint.events.keys import DEFAULT_ROOT, KEY_PATTERNS, KEY_VERSION
+from trigpoint.events.mapped import MapSolved
+from trigpoint.landmarks.feature_query import FeatureSource
+from trigpoint_landmarks.http.application import application
+from trigpoint_landmarks.http.map_watch import MapWatch
+from trigpoint_landmarks.http.ports import MapCorrections
+from trigpoint_landmarks.http.settings import WebSettings
+
+LISTEN_S = 0.5  # between two looks whether to go on listening to the bus
+GRACE_S = 5  # for requests that are under way when the service is told to stop
+KEEP_ALIVE_S = 30
+WAITING = 1024  # connections not yet accepted
+
+logger = logging.getLogger(__name__)
+
+
+class HttpService:
+    """The map over HTTP. `open_source` is called in the event loop's thread; a message of a new version only wakes up.
+
+    Raises InputError for a token file that cannot be read, ServiceError where the address cannot be had.
+    """
+
+    def __init__(
+        self,
+        settings: WebSettings,
+        open_source: Callable[[], FeatureSource],
+        *,
+        corrections: MapCorrections | None = None,
+        bus: Bus | None = None,
+        root: str = DEFAULT_ROOT,
+    ) -> None:
+        self._settings, self._open_source, self._corrections = settings, open_source, corrections
+        self._socket = _listening(settings)
+        self._subscription: Subscription | None = None
+        if bus is not None:
+            pattern = KEY_PATTERNS[MapSolved].format(map="*")
+            self._subscription = bus.subscribe(f"{root}/{KEY_VERSION}/{pattern}")
+        self._watch: MapWatch | None = None
+
+    @property
+    def ready(self) -> bool:
+        """Whether it answers, and the database was there at the last look."""
+        return self._watch is not None and self._watch.reached
+
+    @property
+    def port(self) -> int:
+        """Where it answers."""
+        port: int = self._socket.getsockname()[1]
+        return port
+
+    def run(self, stop: threading.Event) -> None:
+        """Works until told to stop; requests under way are finished first. Raises InputError, ServiceError."""
+        with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
+            runner.run(self._serve(stop))
+
+    def close(self) -> None:
+        """Nothing is listened to any more; again: no effect."""
+        self._socket.close()
+        if self._subscription is not None:
+            self._subscription.close()
+
+    async def _serve(self, stop: threading.Event) -> None:
+        source = self._open_source()
+        watch = MapWatch(source, look_s=self._settings.look_s)
+        server = uvicorn.Server(self._configuration(application(self._settings, source, watch, self._corrections)))
+        following = asyncio.create_task(watch.follow())
+        listening = asyncio.create_task(self._listen(watch, stop))
+        serving = asyncio.create_task(server.serve([self._socket]))
+        self._watch = watch
+        logger.info("serving", extra={"host": self._settings.host, "port": self.port})
+        try:
+            await asyncio.wait((serving, listening), return_when=asyncio.FIRST_COMPLETED)
+            server.should_exit = True
+            await serving
+        finally:
+            self._watch = None
+            following.cancel()
+            await asyncio.gather(following, listening, return_exceptions=True)
+            await source.close()
+
+    async def _listen(self, watch: MapWatch, stop: threading.Event) -> None:
+        """Tells the watch of new versions, until the service is to stop."""
+        while not await asyncio.to_thread(self._heard, stop, watch, asyncio.get_running_loop()):
+            pass
+
+    def _heard(self, stop: threading.Event, watch: MapWatch, loop: asyncio.AbstractEventLoop) -> bool:
+        """Whether to stop, after a while."""
+        if self._subscription is None:
+            return stop.wait(LISTEN_S)
+        if self._subscription.receive(LISTEN_S) is not None:
+            loop.call_soon_threadsafe(watch.tell)
+        return stop.is_set()
+
+    def _configuration(self, served: object) -> uvicorn.Config:
+        return uvicorn.Config(
+            served,  # type: ignore[arg-type]  # an ASGI application, which has no type of its own here
+            http="httptools",
+            ws="none",
+            lifespan="off",
+            interface="asgi3",
+            log_config=None,
+            access_log=False,
+            server_header=False,
+            date_header=True,
+            proxy_headers=False,
+            timeout_keep_alive=KEEP_ALIVE_S,
+            timeout_graceful_shutdown=GRACE_S,
+        )
+
+
+def _listening(settings: WebSettings) -> socket.socket:
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    listening = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind((settings.host, settings.port))
+        listening.listen(WAITING)
+    except OSError as error:
+        listening.close()
+        raise ServiceError(f"nothing can be served on {settings.host}:{settings.port}: {error.strerror}") from error
+    listening.setblocking(False)
+    return listening

@@ -1,0 +1,102 @@
+"""Vector tiles over HTTP: kept in memory by version, named by strong ETags, empty ones without content."""
+
+import asyncio
+import re
+from http import HTTPStatus
+
+from starlette.responses import Response
+
+from trigpoint.errors import InputError
+from trigpoint.geodesy.web_tiles import WebTile
+from trigpoint.landmarks.feature_query import FeatureSource, MapState
+from trigpoint.landmarks.layers import LAYERS, Layer
+from trigpoint.landmarks.tile_grid import require_tile
+from trigpoint_landmarks.http.asked import Asked
+from trigpoint_landmarks.http.documents import MVT
+from trigpoint_landmarks.http.map_watch import MapWatch
+from trigpoint_landmarks.http.problems import Problem
+from trigpoint_landmarks.http.tile_cache import TileCache
+
+DRAWING = 1  # of this kind: another way to draw tiles gets another number, and other ETags
+YEAR_S = 31_536_000
+FRESH_S = 1  # how long a tile of whatever version is newest may be shown unasked
+WHOLE = re.compile(r"0|[1-9][0-9]{0,9}")
+NAMES = ("as_of", "version", "f")
+
+TileKey = tuple[str, WebTile, int]
+
+
+class Tiles:
+    """Tiles from a source, of the version a watch knows, each drawn once for all who ask for it at the same time."""
+
+    def __init__(self, source: FeatureSource, watch: MapWatch, *, cache_bytes: int, public: bool) -> None:
+        self._source, self._watch = source, watch
+        self._cache = TileCache(limit_bytes=cache_bytes)
+        self._drawing: dict[TileKey, asyncio.Task[bytes]] = {}
+        self._audience = "public" if public else "private"
+
+    async def tile(self, asked: Asked, layer: Layer, tile: WebTile, *, as_of: int | None, etag: str) -> Response:
+        """A tile; `etag`: what a client holds, by its If-None-Match. Raises Problem, DatabaseUnavailable."""
+        state = await self._watch.current()
+        if state is None:
+            return Response(None, HTTPStatus.NO_CONTENT, {"Cache-Control": "no-cache"})
+        state = await self._watch.version(as_of, state)
+        version = state.newest if as_of is None else as_of
+        own = f'"{DRAWING}-{layer.name}-{tile.zoom}-{tile.column}-{tile.row}-{version}"'
+        kept = f"max-age={YEAR_S}, immutable" if as_of is not None else f"max-age={FRESH_S}, must-revalidate"
+        headers = {"ETag": own, "Cache-Control": f"{self._audience}, {kept}"}
+        if etag and _matches(etag, own):
+            return Response(None, HTTPStatus.NOT_MODIFIED, headers)
+        content = await self._content((layer.name, tile, version), layer, state)
+        if not content:
+            return Response(None, HTTPStatus.NO_CONTENT, headers)
+        return Response(content, HTTPStatus.OK, headers, MVT)
+
+    async def _content(self, key: TileKey, layer: Layer, state: MapState) -> bytes:
+        held = self._cache.get(key)
+        if held is not None:
+            return held
+        drawing = self._drawing.get(key)
+        if drawing is None:
+            drawing = asyncio.create_task(self._drawn(key, layer, state))
+            self._drawing[key] = drawing
+            drawing.add_done_callback(lambda _: self._drawing.pop(key, None))
+        return await asyncio.shield(drawing)
+
+    async def _drawn(self, key: TileKey, layer: Layer, state: MapState) -> bytes:
+        _, tile, version = key
+        content = await self._source.tile(layer, tile, state, as_of=version)
+        self._cache.put(key, content)
+        return content
+
+
+def tile_of(zoom: str, column: str, row: str) -> WebTile:
+    """The tile of three numbers as they stand in a path. Raises Problem where there is none."""
+    if not all(map(WHOLE.fullmatch, (zoom, column, row))):
+        raise Problem(HTTPStatus.NOT_FOUND, "a tile's zoom, column and row are whole numbers")
+    try:
+        return require_tile(int(zoom), int(column), int(row))
+    except InputError as error:
+        raise Problem(HTTPStatus.NOT_FOUND, str(error)) from error
+
+
+def tiled_layer(name: str) -> Layer:
+    """The layer of a name. Raises Problem where there are no tiles of one."""
+    layer = LAYERS.get(name)
+    if layer is None or not layer.tiled:
+        there = ", ".join(one.name for one in LAYERS.values() if one.tiled)
+        raise Problem(HTTPStatus.NOT_FOUND, f"no tiles of {name[:40]!r}: there are those of {there}")
+    return layer
+
+
+def asked_version(asked: Asked) -> int | None:
+    """The version of `as_of` or `version`, which mean the same. Raises InputError for both."""
+    asked.require_only(NAMES)
+    if "as_of" in asked.parameters and "version" in asked.parameters:
+        raise InputError("as_of and version mean the same: one of them is enough")
+    return asked.whole("as_of") if "as_of" in asked.parameters else asked.whole("version")
+
+
+def _matches(given: str, own: str) -> bool:
+    """Whether an If-None-Match names an ETag, weakly compared (RFC 9110, 13.1.2)."""
+    return given.strip() == "*" or own in {one.strip().removeprefix("W/") for one in given.split(",")}

@@ -1,0 +1,1 @@
+"""A map that answers over a bus, for tests and figures of its clients."""

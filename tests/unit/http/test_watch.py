@@ -1,0 +1,107 @@
+"""The newest version is known by looking, and sooner by word of it."""
+
+import asyncio
+from collections.abc import Sequence
+
+import pytest
+
+from trigpoint.errors import DatabaseUnavailable
+from trigpoint.geodesy.web_tiles import WebTile
+from trigpoint.landmarks.feature_query import FeaturePage, FeatureQuery, MapState
+from trigpoint.landmarks.layers import Layer
+from trigpoint_landmarks.http.map_watch import MapWatch
+from trigpoint_landmarks.http.problems import Problem
+
+
+def map_of(versions: Sequence[int]) -> MapState:
+    return MapState(
+        versions=tuple(versions),
+        crs="EPSG:32756",
+        origin_easting_m=0.0,
+        origin_northing_m=0.0,
+        solved_ns=0,
+        box=None,
+        seen=None,
+    )
+
+
+class ScriptedSource:
+    """A source whose state is as the test says; `looks` counts how often it was asked."""
+
+    def __init__(self) -> None:
+        self.now: MapState | None = map_of([1])
+        self.away = False
+        self.looks = 0
+
+    async def state(self, known: MapState | None) -> MapState | None:
+        self.looks += 1
+        if self.away:
+            raise DatabaseUnavailable("away")
+        return self.now
+
+    async def page(self, query: FeatureQuery, state: MapState) -> FeaturePage:
+        raise NotImplementedError
+
+    async def tile(self, layer: Layer, tile: WebTile, state: MapState, *, as_of: int) -> bytes:
+        raise NotImplementedError
+
+    async def close(self) -> None:
+        pass
+
+
+@pytest.fixture
+def source() -> ScriptedSource:
+    return ScriptedSource()
+
+
+def test_a_version_that_was_told_of_is_known_at_once(source: ScriptedSource) -> None:
+    async def seen() -> int:
+        watch = MapWatch(source, look_s=600.0)
+        following = asyncio.create_task(watch.follow())
+        while watch.state is None:
+            await asyncio.sleep(0)
+        source.now = map_of([1, 2])
+        watch.tell()
+        while watch.state.newest == 1:
+            await asyncio.sleep(0)
+        following.cancel()
+        return watch.state.newest
+
+    assert asyncio.run(asyncio.wait_for(seen(), 5.0)) == 2
+
+
+def test_a_version_that_is_asked_for_is_looked_for(source: ScriptedSource) -> None:
+    async def asked() -> MapState:
+        watch = MapWatch(source, look_s=600.0)
+        known = await watch.current()
+        assert known is not None
+        source.now = map_of([1, 2])
+        return await watch.version(2, known)
+
+    assert asyncio.run(asked()).versions == (1, 2)
+
+
+def test_an_old_version_that_is_gone_is_not_looked_for(source: ScriptedSource) -> None:
+    async def asked() -> None:
+        watch = MapWatch(source, look_s=600.0)
+        known = await watch.current()
+        assert known is not None
+        await watch.version(0, known)
+
+    with pytest.raises(Problem, match="map version 0 is unknown: 1 to 1 are there"):
+        asyncio.run(asked())
+    assert source.looks == 1
+
+
+def test_a_database_that_comes_back_is_asked_again(source: ScriptedSource) -> None:
+    async def asked() -> tuple[bool, bool]:
+        watch = MapWatch(source, look_s=600.0)
+        source.away = True
+        with pytest.raises(DatabaseUnavailable):
+            await watch.current()
+        before = watch.reached
+        source.away = False
+        await watch.current()
+        return before, watch.reached
+
+    assert asyncio.run(asked()) == (False, True)
