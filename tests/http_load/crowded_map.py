@@ -8,6 +8,7 @@ import pytest
 
 from landmark_databases.cluster import Cluster, running_cluster
 from landmark_maps.examples import change, checkpoint, frame, solved_landmark
+from trigpoint.events.solved_landmarks import in_columns
 from trigpoint.geodesy.positions import Wgs84Position
 from trigpoint.geodesy.web_tiles import tile_at
 from trigpoint.landmarks.postgis_store import PostgisStore
@@ -32,7 +33,8 @@ METRES_LAT, METRES_LON = 110_900.0, 92_200.0  # of a degree there
 def crowded_cluster() -> Iterator[tuple[Cluster, str]]:
     """A server with the map in it, and the database's name; PostgreSQL's clients know the password."""
     points_m = np.random.default_rng(SEED).uniform(0.0, SIDE_M, (COUNT, 2)).tolist()
-    rows = landmark_rows([solved_landmark(f"L{n}", x_m, y_m) for n, (x_m, y_m) in enumerate(points_m)], frame())
+    solved = [solved_landmark(f"L{n}", x_m, y_m) for n, (x_m, y_m) in enumerate(points_m)]
+    rows = landmark_rows(in_columns(solved), frame())
     with running_cluster(durable=False) as cluster, pytest.MonkeyPatch.context() as patch:
         patch.setenv("PGPASSFILE", str(cluster.password_table))
         database = cluster.created()

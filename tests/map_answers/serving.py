@@ -35,8 +35,7 @@ def scattered(count: int, *, seed: int) -> list[Landmark]:
     like = landmark("", 0.0, 0.0)
     places = zip(at_m.tolist(), lat_deg.tolist(), lon_deg.tolist(), strict=True)
     return [
-        replace(
-            like,
+        like._replace(
             landmark=f"lm-{number:06}",
             x_m=x_m,
             y_m=y_m,

@@ -17,8 +17,7 @@ def crowd(*, seed: int = 5) -> list[Landmark]:
     at_m = random.uniform(-SIDE_M / 2, SIDE_M / 2, (COUNT, 2)).tolist()
     sigma_m = random.uniform(0.05, 2.0, COUNT).tolist()
     return [
-        replace(
-            landmark(f"{'ÄL'[n % 2]}{n}", *at_m[n], kind=("pole", "Corner", "a_b%c\\d")[n % 3]),
+        landmark(f"{'ÄL'[n % 2]}{n}", *at_m[n], kind=("pole", "Corner", "a_b%c\\d")[n % 3])._replace(
             sigma_major_m=sigma_m[n],
             observation_count=n,
             first_seen_ns=START_NS + n * 1_000_000_000,

@@ -1,7 +1,5 @@
 """Values with something in every field."""
 
-from dataclasses import replace
-
 from landmark_maps.examples import START_NS, landmark
 from trigpoint.geodesy.web_tiles import WebTile
 from trigpoint.landmarks.asked import (
@@ -46,8 +44,8 @@ POINT = (332_001.5, 6_248_002.5)
 
 def row(name: str) -> Landmark:
     """A landmark as it is told: without provenance."""
-    fixed = replace(landmark(name, 1.5, 2.5, map_version=3), lat_deg=-33.9, lon_deg=151.2, provenance="")
-    return replace(fixed, valid_to_version=9)
+    fixed = landmark(name, 1.5, 2.5, map_version=3)._replace(lat_deg=-33.9, lon_deg=151.2, provenance="")
+    return fixed._replace(valid_to_version=9)
 
 
 TILE_CHANGE = TileChange(tile=TILE, before=6, after=7, changed=(row("L1"),), removed=("L2", "ö/3"))

@@ -370,8 +370,7 @@ def varied(store: LandmarkStore) -> tuple[LandmarkStore, MemoryStore]:
     numbers = np.random.default_rng(6)
     at_m = numbers.uniform(-1000.0, 1000.0, (250, 2)).tolist()
     rows = [
-        replace(
-            landmark(f"L{n}", *at_m[n], kind=("pole", "corner", "")[n % 3]),
+        landmark(f"L{n}", *at_m[n], kind=("pole", "corner", "")[n % 3])._replace(
             sigma_major_m=0.1 + 0.01 * (n % 20),
             vehicles=(("veh-a",), ('veh "b"',), ("veh-a", "ö, veh-c"), ())[n % 4],
             first_seen_ns=START_NS + n * SECOND_NS,

@@ -3,7 +3,6 @@
 import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -53,7 +52,7 @@ def test_questions_are_answered_over_the_network() -> None:
     with over_zenoh() as (_, client):
         answer = client.landmarks(LandmarkQuery(bbox=NEAR))
         assert {row.landmark for row in answer.landmarks} == set(ROWS)
-        assert replace(answer.landmarks[0], provenance=ROWS["L0"].provenance) == ROWS["L0"]
+        assert answer.landmarks[0]._replace(provenance=ROWS["L0"].provenance) == ROWS["L0"]
 
 
 def test_the_asyncio_twin_gives_the_same_answers() -> None:

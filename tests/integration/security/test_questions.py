@@ -4,9 +4,10 @@ from collections.abc import Iterator
 
 import pytest
 
+from command_runs.processes import comes_true
 from landmark_maps.examples import change, checkpoint, landmark
 from map_answers.answering import SOON_S, answered
-from secured_fleet.fleet import SecuredFleet, comes_true, secured_fleet
+from secured_fleet.fleet import SecuredFleet, secured_fleet
 from trigpoint.bus.ports import Bus, BusMessage, Content
 from trigpoint.bus.register import Role
 from trigpoint.client.asking import MapClient

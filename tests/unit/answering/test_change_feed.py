@@ -1,7 +1,6 @@
 """What is told of a version that is durable, and what is put together from it."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import pytest
 
@@ -111,7 +110,7 @@ def test_versions_made_durable_together_are_one_step(told: tuple[FeedingStore, S
 
 def test_too_much_at_once_is_told_by_the_version_alone(told: tuple[FeedingStore, Subscription]) -> None:
     store, subscription = told
-    store.apply(change(1, opened=[replace(HERE, landmark=f"L{n}") for n in range(TOLD_MOST + 1)]), checkpoint(1))
+    store.apply(change(1, opened=[HERE._replace(landmark=f"L{n}") for n in range(TOLD_MOST + 1)]), checkpoint(1))
     (only,) = heard(subscription)
     assert decoded_version_change(only.payload).tiles is None
 

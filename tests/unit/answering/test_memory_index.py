@@ -45,8 +45,7 @@ QUERIES = {
 def crowd() -> tuple[list[Landmark], list[Landmark]]:
     at_m = np.random.default_rng(5).uniform(-1000.0, 1000.0, (1500, 2)).tolist()
     rows = [
-        replace(
-            landmark(f"L{n}", *at_m[n], kind=("pole", "corner", "")[n % 3]),
+        landmark(f"L{n}", *at_m[n], kind=("pole", "corner", "")[n % 3])._replace(
             sigma_major_m=0.1 + 0.01 * (n % 20),
             vehicles=(("veh-a",), ("veh-b", "veh-a"), ())[n % 3],
             first_seen_ns=START_NS + n * SECOND_NS,
