@@ -34,6 +34,6 @@ def read_store(settings: Settings) -> LandmarkStore:
     as `opened_store` does."""
     url = database_url(settings)
     file = geopackage_path(url)
-    if file is not None and not file.is_file():
+    if file is not None and not (file.is_file() and file.stat().st_size):  # empty while its tables are being made
         raise DatabaseUnavailable(f"no landmark database at {file} yet")
     return opened_store(url, password_file=settings.database.password_file, read_only=True)

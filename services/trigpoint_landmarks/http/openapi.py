@@ -171,37 +171,43 @@ def _of_map() -> JsonObject:
     }
 
 
+LINKS: JsonObject = {"type": "array", "items": {"$ref": "#/components/schemas/Link"}}
+VERSION: JsonObject = {"type": "integer"}
+
+
 def _schemas() -> JsonObject:
-    links: JsonObject = {"type": "array", "items": {"$ref": "#/components/schemas/Link"}}
-    version: JsonObject = {"type": "integer"}
     return {
         "Problem": {**_object("type", "title", "status", "detail"), "properties": {"status": {"type": "integer"}}},
         "Link": {**_object("href", "rel"), "properties": {"href": {"type": "string"}, "rel": {"type": "string"}}},
         "Collection": {
             **_object("id", "links", "crs", "storageCrs"),
-            "properties": {"id": {"type": "string"}, "links": links},
+            "properties": {"id": {"type": "string"}, "links": LINKS},
         },
-        "Feature": {
-            **_object("type", "id", "geometry", "properties"),
-            "properties": {
-                "type": {"type": "string", "enum": ["Feature"]},
-                "id": {"type": "string"},
-                "geometry": {**_object("type", "coordinates"), "nullable": True},
-                "properties": {"type": "object"},
-                "map_version": version,
-                "links": links,
-            },
-        },
+        "Feature": _feature_schema(),
         "FeatureCollection": {
             **_object("type", "features", "links", "numberReturned"),
             "properties": {
                 "type": {"type": "string", "enum": ["FeatureCollection"]},
-                "map_version": version,
+                "map_version": VERSION,
                 "numberReturned": WHOLE,
                 "numberMatched": WHOLE,
-                "links": links,
+                "links": LINKS,
                 "features": {"type": "array", "items": {"$ref": "#/components/schemas/Feature"}},
             },
+        },
+    }
+
+
+def _feature_schema() -> JsonObject:
+    return {
+        **_object("type", "id", "geometry", "properties"),
+        "properties": {
+            "type": {"type": "string", "enum": ["Feature"]},
+            "id": {"type": "string"},
+            "geometry": {**_object("type", "coordinates"), "nullable": True},
+            "properties": {"type": "object"},
+            "map_version": VERSION,
+            "links": LINKS,
         },
     }
 

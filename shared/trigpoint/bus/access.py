@@ -89,13 +89,13 @@ OPTIMISATION = Grant(
 )
 LANDMARKS = Grant(
     publish=("map/*/changes/**",),
-    listen=("map/**",),
+    listen=("map/**", "veh/*/obs/landmarks"),
     claim=("live/landmarks/**",),
     watch=("live/**",),
     hear_of=("**",),
 )
 ANSWERS = Grant(
-    listen=("map/**",),
+    listen=("map/**", "veh/*/obs/landmarks"),
     answer=("map/*/ask/**",),
     claim=("live/answers/**",),
     watch=("live/**",),
