@@ -1,6 +1,7 @@
 """`trigpoint evaluate relocalise`: whether vehicles find themselves in the map."""
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -20,6 +21,7 @@ from trigpoint_cli.output import Answer, Screen, answering, metres
 from trigpoint_evaluation.app import logged_map, mapped_points, read_truth, true_points
 from trigpoint_evaluation.core.landmark_truth import matched
 from trigpoint_evaluation.core.relocalisation_trial import (
+    TrialResult,
     TrialSettings,
     TrueWorld,
     kinds_by_match,
@@ -74,8 +76,11 @@ def relocalise(
         for finding in trial_findings(trial_places(world, settings), known, settings, find=find):
             findings.append(finding)
             advance(1)
-    result = trial_result(findings)
-    p50_s, p99_s = np.percentile(find.seconds, [50.0, 99.0])
+    return _answer(solved, trial_result(findings), find.seconds)
+
+
+def _answer(solved: SolvedMap, result: TrialResult, seconds: Sequence[float]) -> Answer:
+    p50_s, p99_s = np.percentile(seconds, [50.0, 99.0])
     values = {
         "map_version": solved.head.map_version,
         "places": result.places,

@@ -23,7 +23,7 @@ from trigpoint_cli.output import Answer, Screen, answering, metres
 from trigpoint_cli.relocalise import known_landmarks
 from trigpoint_evaluation.app import logged_map, read_truth
 from trigpoint_evaluation.core.paths import poses_at
-from trigpoint_evaluation.core.relocalisation_trial import Finding, finding_at, trial_result
+from trigpoint_evaluation.core.relocalisation_trial import Finding, TrialResult, finding_at, trial_result
 from trigpoint_optimisation.core.odometry import dead_reckon
 from trigpoint_optimisation.core.preparation import nominal_calibration
 from trigpoint_optimisation.settings import SolveSettings
@@ -97,7 +97,10 @@ def relocalise_drive(
             seen = watch.around(at_ns, window_s=window_s, merged_m=SAME_NAME_M if signatures else 0.4)
             findings.append(finding_at(relocalised(seen, known, anywhere, EXPECTED), pose, map_error_m=np.zeros(2)))
             advance(1)
-    result = trial_result(findings)
+    return _answer(vehicle, solved, trial_result(findings))
+
+
+def _answer(vehicle: str, solved: SolvedMap, result: TrialResult) -> Answer:
     values = {
         "map_version": solved.head.map_version,
         "vehicle": vehicle,

@@ -9,7 +9,6 @@ import tempfile
 import threading
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -99,7 +98,7 @@ def moving(endpoint: str, versions: str, pause_s: str) -> None:
             ready()
             sys.stdin.readline()
             for version in range(2, int(versions) + 2):
-                moved = [replace(row, last_seen_ns=START_NS + version) for row in rows[version % 200 :: 200]]
+                moved = [row._replace(last_seen_ns=START_NS + version) for row in rows[version % 200 :: 200]]
                 step = change(version, opened=moved, closed=[row.landmark for row in moved])
                 twin.apply(step, checkpoint(version))
                 told.apply(step, checkpoint(version))

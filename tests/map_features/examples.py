@@ -84,7 +84,7 @@ def offset(*, map_version: int = 1, x_m: float = 0.2) -> ImageOffset:
 def two_versions() -> tuple[MapChange, MapChange]:
     """A whole version, and one that moves every third landmark by 10 m to the north, and one of two paths."""
     rows = crowd()
-    moved = [replace(landmark(row.landmark, row.x_m, row.y_m + 10.0, kind=row.kind)) for row in rows[::3]]
+    moved = [landmark(row.landmark, row.x_m, row.y_m + 10.0, kind=row.kind)._replace() for row in rows[::3]]
     first = replace(
         change(1, opened=rows),
         trajectories=(path("veh-a", map_version=1), path("veh-b", map_version=1, shift_m=50.0)),

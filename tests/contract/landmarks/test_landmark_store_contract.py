@@ -378,7 +378,7 @@ def varied(store: LandmarkStore) -> tuple[LandmarkStore, MemoryStore]:
         )
         for n in range(200)
     ]
-    again = [replace(landmark(f"L{4 * n}", *at_m[200 + n]), observation_count=99) for n in range(50)]
+    again = [landmark(f"L{4 * n}", *at_m[200 + n])._replace(observation_count=99) for n in range(50)]
     twin = MemoryStore()
     for one in (store, twin):
         one.apply(change(1, opened=rows), checkpoint(1))

@@ -53,7 +53,7 @@ def crowd() -> tuple[list[Landmark], list[Landmark]]:
         )
         for n in range(1200)
     ]
-    return rows, [replace(landmark(f"L{3 * n}", *at_m[1200 + n]), valid_from_version=2) for n in range(300)]
+    return rows, [landmark(f"L{3 * n}", *at_m[1200 + n])._replace(valid_from_version=2) for n in range(300)]
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +88,7 @@ def test_a_landmark_comes_back_as_it_was_but_for_its_provenance(both: tuple[Memo
     of = AnsweredMap(map_version=2, origin_easting_m=332_000.0, origin_northing_m=6_248_000.0)
     slots = index.found(LandmarkQuery(bbox=BOX)).slots
     rows = [landmark_of(parsed(pb.AnsweredLandmark, one), of) for one in index.landmarks(slots)]
-    assert rows == [replace(row, provenance="") for row in store.landmarks(LandmarkQuery(bbox=BOX))]
+    assert rows == [row._replace(provenance="") for row in store.landmarks(LandmarkQuery(bbox=BOX))]
 
 
 def test_a_place_that_is_free_again_is_taken_again() -> None:

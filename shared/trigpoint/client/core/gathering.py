@@ -24,7 +24,7 @@ class _Thing:
     def take(self, point_m: Floats, information: Floats) -> None:
         self.information = self.information + information
         self.weighted_m = self.weighted_m + information @ point_m
-        self.point_m = np.linalg.solve(self.information, self.weighted_m)
+        self.point_m = np.asarray(np.linalg.solve(self.information, self.weighted_m), dtype=np.float64)
         self.count += 1
 
 
