@@ -117,6 +117,7 @@ GRANTS: Mapping[Role, Grant] = {
     Role.OPTIMISATION: OPTIMISATION,
     Role.LANDMARKS: LANDMARKS,
     Role.ANSWERS: ANSWERS,
+    Role.HTTP: CLIENT,
     Role.SERVICE: INGEST.joined(FILTERING, OPTIMISATION, LANDMARKS, ANSWERS),
     Role.ROUTER: Grant(everything=("**",)),
 }

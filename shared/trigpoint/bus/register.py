@@ -26,6 +26,7 @@ class Role(StrEnum):
     OPTIMISATION = "optimisation"
     LANDMARKS = "landmarks"
     ANSWERS = "answers"
+    HTTP = "http"
     SERVICE = "service"
     CLIENT = "client"
     ROUTER = "router"

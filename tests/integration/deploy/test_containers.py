@@ -79,13 +79,13 @@ def test_a_containers_configuration_is_valid_and_names_its_own_secrets(name: str
     session = settings.router if name == "router" else settings.bus
     assert session.tls is not None
     named = {str(session.tls.authority_file), str(session.tls.certificate_file), str(session.tls.key_file)}
-    password = settings.database.password_file
-    assert named | ({str(password)} if password else set()) == secrets
+    extra = {str(path) for path in (settings.database.password_file, settings.web.token_file) if path}
+    assert named | extra == secrets
 
 
-def test_only_landmarks_and_answers_have_the_databases_password() -> None:
+def test_only_who_needs_the_database_has_its_password() -> None:
     holders = [name for name in compose()["services"] if f"{SECRETS}/database_password" in secret_paths(name)]
-    assert sorted(holders) == ["answers", "database", "landmarks"]
+    assert sorted(holders) == ["answers", "database", "http", "landmarks"]
 
 
 def test_every_secret_is_declared_used_and_of_a_role_that_exists() -> None:
