@@ -12,6 +12,8 @@ Ints = NDArray[np.int64]
 SPACING_MIN_M = 1.0  # two landmarks closer together say next to nothing of the heading
 TOLERANCE = 3.0  # sigmas, of a distance
 PAIRS_MOST = 60  # observed pairs that propose: the longest, which say most of the heading
+COMPARED_MOST = 8_000_000  # landmarks compared in all when proposals are tried, so that an answer stays quick:
+# pairs with few likes go first, which say most of the place
 
 
 def proposed_motions(observed: Constellation, known: Constellation) -> Floats:
@@ -23,7 +25,7 @@ def proposed_motions(observed: Constellation, known: Constellation) -> Floats:
     order = np.argsort(spacing_m)
     low = np.searchsorted(spacing_m[order], distance_m - TOLERANCE * sigma_m)
     high = np.searchsorted(spacing_m[order], distance_m + TOLERANCE * sigma_m)
-    pair, offset = _ranges(high - low)
+    pair, offset = _ranges(_fewest_first(high - low, most=COMPARED_MOST // (len(observed) * len(known))))
     like = order[low[pair] + offset]
     alike = same_kind(observed, known)
     fits = alike[first[pair], a[like]] & alike[second[pair], b[like]]
@@ -43,6 +45,15 @@ def _observed_pairs(observed: Constellation) -> tuple[Ints, Ints, Floats, Floats
     covariance_m2 = observed.covariance_m2[first] + observed.covariance_m2[second]
     sigma_m = np.sqrt(np.einsum("pi,pij,pj->p", along, covariance_m2, along))
     return first, second, distance_m, sigma_m
+
+
+def _fewest_first(count: Ints, *, most: int) -> Ints:
+    """The counts (p,), the largest set to 0 until at most so many are left in all."""
+    rising = np.argsort(count, kind="stable")
+    kept = np.zeros_like(count)
+    within = rising[np.cumsum(count[rising]) <= most]
+    kept[within] = count[within]
+    return kept
 
 
 def _ranges(count: Ints) -> tuple[Ints, Ints]:
