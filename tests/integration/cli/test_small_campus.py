@@ -257,7 +257,7 @@ def test_replay_says_plainly_that_a_shortened_log_does_not_begin_at_0(campus: Bu
 
 
 def test_places_are_found_again_in_the_map_by_a_handful_of_landmarks(campus: BuiltCampus) -> None:
-    words = ("--data", campus.data, "--truth", campus.written.truth, "--places", 40, "--json")
+    words = ("--data", campus.data, "--truth", str(campus.written.truth), "--places", 40, "--json")
     answer = trigpoint("evaluate", "relocalise", *words).answer
     assert answer["confident_share"] > 0.8
     assert answer["error_in_map_m"]["max"] < 0.5
@@ -265,13 +265,15 @@ def test_places_are_found_again_in_the_map_by_a_handful_of_landmarks(campus: Bui
 
 
 def test_a_drive_that_is_found_again_by_what_it_saw_is_near_where_it_was(campus: BuiltCampus) -> None:
-    words = ("--data", campus.data, "--truth", campus.written.truth, "--places", 20, "--no-signatures", "--json")
+    words = ("--data", campus.data, "--truth", str(campus.written.truth), "--places", 20, "--no-signatures", "--json")
     answer = trigpoint("evaluate", "relocalise-drive", "vehicle-1", *words).answer
     assert answer["error_m"]["count"] == round(20 * answer["confident_share"])
     assert answer["off_by_2_m"] == 0
 
 
 def test_a_vehicle_that_never_drove_is_named_with_those_that_did(campus: BuiltCampus) -> None:
-    run = trigpoint("evaluate", "relocalise-drive", "vehicle-9", "--data", campus.data, "--truth", campus.written.truth)
+    run = trigpoint(
+        "evaluate", "relocalise-drive", "vehicle-9", "--data", campus.data, "--truth", str(campus.written.truth)
+    )
     assert run.status == 2
     assert "'vehicle-9' has no drive in the log; these have: vehicle-1, vehicle-2" in run.err
