@@ -27,8 +27,9 @@ Rows = Sequence[Envelope[Observed]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UpdateTimes:
-    """99th percentiles of the updates from so many poses in the map on: by the clock, and of the processor; how many
-    poses the map had in the end and the growing graph at most, and how often the whole map was solved."""
+    """99th percentiles of the updates from so many poses in the map on (of the newest whole map's paths and of the
+    growing graph): by the clock, and of the processor; how many poses the map had in the end and the growing graph at
+    most, and how often the whole map was solved."""
 
     poses: int
     growing_most: int
@@ -81,7 +82,7 @@ def update_times(*, vehicles: int, poses: int, seed: int = 1) -> UpdateTimes:
     solving = _Solving(campus, SolveSettings())
     fleet = LiveFleet(campus.frame, SolveSettings())
     wall, processor = [], []
-    driven = most = 0  # keyframes of all drives; of the growing graph
+    most = 0  # poses of the growing graph
     for index, recording in enumerate(campus.recordings):
         verdicts = {verdict.fix_sequence: verdict for verdict in accepted_fixes(campus, index)}
         for count, row in enumerate(recording.rows, start=1):
@@ -89,8 +90,7 @@ def update_times(*, vehicles: int, poses: int, seed: int = 1) -> UpdateTimes:
             places = fleet.take(row)
             if row.identity.sequence in verdicts:
                 fleet.judged(verdicts[row.identity.sequence])
-            driven += len(places)
-            if places and driven >= poses:
+            if places and solving.pose_count + fleet.map.pose_count >= poses:
                 wall.append(time.perf_counter() - began_s)
                 processor.append(time.thread_time() - began_processor_s)
             most = max(most, fleet.map.pose_count)
@@ -100,7 +100,7 @@ def update_times(*, vehicles: int, poses: int, seed: int = 1) -> UpdateTimes:
         1e3 * float(np.percentile(each, 99)) if each else math.nan for each in (wall, processor)
     )
     return UpdateTimes(
-        poses=driven,
+        poses=solving.pose_count + fleet.map.pose_count,
         growing_most=most,
         solves=solving.count,
         p99_ms=p99_ms,
@@ -115,13 +115,14 @@ class _Solving:
         self._campus, self._settings = campus, settings
         self._solved: SolvedMap | None = None
         self._due_ns = 0
-        self.count = 0  # of the solves taken in
+        self.pose_count = self.count = 0  # of the newest whole map; of the solves taken in
 
     def look(self, fleet: LiveFleet, *, drive: int, rows: int, stamp_ns: int) -> None:
         """A solve begun of what came so far, `rows` of this drive's, or the one under way taken in if it is due."""
         if self._solved is not None and stamp_ns >= self._due_ns:
             solved, self._solved = self._solved, None
             self.count += 1
+            self.pose_count = sum(len(path.stamp_ns) for path in solved.trajectories)
             fleet.begin_anew(solved.landmarks, solved.trajectories, excluded=())
         elif self._solved is None and fleet.map.pose_count > self._settings.live.pose_limit:
             began_s = time.perf_counter()
