@@ -8,6 +8,7 @@ from contextlib import ExitStack
 
 import pytest
 
+from command_runs.processes import wait_until
 from trigpoint.bus.arrivals import run_of_messages
 from trigpoint.bus.memory_bus import MemoryBus, MemoryExchange
 from trigpoint.bus.ports import UNIDENTIFIED, Bus, BusMessage, Content, Query, Queryable, Replies, Reply, Subscription
@@ -59,22 +60,16 @@ def until_heard(bus: Bus, key: str) -> None:
 
 
 def until_lost(subscription: Subscription, count: int) -> None:
-    deadline = time.monotonic() + SOON_S
-    while subscription.lost < count and time.monotonic() < deadline:
-        time.sleep(0.001)
+    wait_until(lambda: subscription.lost >= count, f"{count} lost")
 
 
 def until_waiting(subscription: Subscription, count: int) -> None:
-    deadline = time.monotonic() + SOON_S
-    while subscription.waiting < count and time.monotonic() < deadline:
-        time.sleep(0.001)
+    wait_until(lambda: subscription.waiting >= count, f"{count} waiting")
 
 
 def until_claimed(bus: Bus, expression: str, keys: tuple[str, ...]) -> None:
     """A claim or its end takes a moment to travel."""
-    deadline = time.monotonic() + SOON_S
-    while bus.claimed(expression) != keys and time.monotonic() < deadline:
-        time.sleep(0.001)
+    wait_until(lambda: bus.claimed(expression) == keys, f"{keys} claimed")
 
 
 def received_in_runs(subscription: Subscription, count: int) -> list[BusMessage]:
@@ -317,8 +312,7 @@ def test_a_foreign_message_arrives_as_unidentified(payload: bytes, attachment: b
         config.insert_json5("connect/endpoints", f'["{endpoint}"]')
         config.insert_json5("scouting/multicast/enabled", "false")
         with zenoh.open(config) as stranger, stranger.declare_publisher("t/a") as publisher:
-            while not publisher.matching_status.matching:
-                time.sleep(0.001)
+            wait_until(lambda: publisher.matching_status.matching, "the subscription known")
             publisher.put(payload, attachment=attachment)
             received = subscription.receive(SOON_S)
     assert received is not None
@@ -436,9 +430,7 @@ def test_queries_that_wait_when_a_queryable_is_closed_end_unanswered(pair: tuple
     found: list[Replies] = []
     asking = threading.Thread(target=lambda: found.append(pair[0].get("t/ask", QUESTION, timeout_s=SOON_S)))
     asking.start()
-    deadline = time.monotonic() + SOON_S
-    while not queryable.waiting and time.monotonic() < deadline:
-        time.sleep(0.001)
+    wait_until(lambda: queryable.waiting > 0, "the query at the queryable")
     queryable.close()
     asking.join()
     assert found == [Replies((), whole=True)]

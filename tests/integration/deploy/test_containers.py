@@ -151,7 +151,7 @@ def test_the_image_runs_as_nobody_special() -> None:
 def test_the_image_is_built_from_files_that_are_there_and_let_in() -> None:
     copied = [words for words in words_of("COPY") if "--from=" not in words]
     sources = [word for words in copied for word in words.split()[:-1] if not word.startswith("--")]
-    ignored = (REPOSITORY / ".dockerignore").read_text(encoding="utf-8").splitlines()
+    ignored = (DEPLOY / "Dockerfile.dockerignore").read_text(encoding="utf-8").splitlines()
     allowed = [line[1:] for line in ignored if line.startswith("!")]
     assert [source for source in sources if not (REPOSITORY / source).exists()] == []
     assert [source for source in sources if not any(fnmatch(source, pattern) for pattern in allowed)] == []

@@ -40,10 +40,10 @@ class ScriptedSource:
         return self.now
 
     async def page(self, query: FeatureQuery, state: MapState) -> FeaturePage:
-        raise NotImplementedError
+        raise AssertionError("whoever watches asks for no features")
 
     async def tile(self, layer: Layer, tile: WebTile, state: MapState, *, as_of: int) -> bytes:
-        raise NotImplementedError
+        raise AssertionError("whoever watches asks for no features")
 
     async def close(self) -> None:
         pass
