@@ -20,6 +20,7 @@ from trigpoint_ingest.reception import Reception
 from trigpoint_ingest.settings import IngestSettings
 
 IDLE_S = 0.002  # between two looks at an empty queue: waiting for each message costs more than the message
+QUIET_S = 0.01  # nothing came for so long: what is there needs not wait for more
 ALONE_S, ALONE_COUNT = 0.02, 4096  # a group under way has the interpreter to itself so long, if no more messages wait
 CLAIM_LOOK_S = 1.0  # between two looks at others' claims
 
@@ -56,7 +57,8 @@ class IngestService:
         self._committer = ThreadPoolExecutor(1, thread_name_prefix="commit")
         self._group: Group | None = None
         self._committing: Future[None] | None = None
-        self._begun_s = self._sealed_s = self._claims_seen_s = now_s()
+        self._begun_s = self._sealed_s = self._heard_s = self._claims_seen_s = now_s()
+        self._come = 0  # messages there at the last look
         self._blocked = False
         self._closed = False
         self.ready = False
@@ -72,11 +74,29 @@ class IngestService:
         self.ready = True
         try:
             while not stop.is_set():
-                if not self.step(0.0):
+                if self._may_rest() or not self.step(0.0):
                     stop.wait(IDLE_S)
                 self._look_at_claims()
         finally:
             self.ready = False
+
+    def _may_rest(self) -> bool:
+        """Whether all that has come can wait: what is taken together costs less."""
+        now_s, come = self._now_s(), self._reception.waiting + self._gathered
+        if come != self._come:
+            self._come, self._heard_s = come, now_s
+        if self._group is None:
+            return come < self._settings.live_batch_count and not self._waited_enough(now_s)
+        is_slow = now_s - self._begun_s > self._settings.slow_append_s
+        return self._committing is not None and not self._committing.done() and come <= ALONE_COUNT and not is_slow
+
+    @property
+    def _gathered(self) -> int:
+        return self._reception.arrived + self._journal.pending_count
+
+    def _waited_enough(self, now_s: float) -> bool:
+        """Whether a group goes on, however small."""
+        return now_s - self._sealed_s >= self._settings.batch_s or now_s - self._heard_s >= QUIET_S
 
     def step(self, timeout_s: float) -> bool:
         """What has come is taken, at most a group of it; False if nothing came within the timeout. What is due is
@@ -86,10 +106,11 @@ class IngestService:
             and self._journal.pending_bytes < self._settings.pending_bytes
         )
         taken = self._reception.take(timeout_s) if has_room else 0
+        if taken:
+            self._heard_s = self._now_s()
         self._reception.settle()
         self._advance()
-        waiting = self._reception.waiting + self._reception.arrived
-        self._instruments.queue_depth.set(waiting + self._journal.pending_count)
+        self._instruments.queue_depth.set(self._reception.waiting + self._gathered)
         return taken > 0
 
     def _advance(self) -> None:
@@ -107,13 +128,12 @@ class IngestService:
             self._begin(self._sealed())
 
     def _is_due(self, now_s: float) -> bool:
-        journal, settings = self._journal, self._settings
-        waiting = journal.pending_count + self._reception.arrived
-        if waiting >= ALONE_COUNT or journal.pending_bytes >= settings.batch_bytes:
+        if self._gathered >= ALONE_COUNT or self._journal.pending_bytes >= self._settings.batch_bytes:
             return True
-        if waiting >= settings.live_batch_count and not self._reception.waiting:  # else what is there goes along
+        # The vehicles that wait longest go on alone: a small group is soon durable, and then it is the others' turn.
+        if self._gathered >= max(self._settings.live_batch_count, self._reception.waiting // 2):
             return True
-        return now_s - self._sealed_s >= self._settings.batch_s and self._has_work()
+        return self._waited_enough(now_s) and self._has_work()
 
     def _has_work(self) -> bool:
         return self._journal.pending_count > 0 or self._reception.has_to_acknowledge

@@ -23,7 +23,7 @@ from trigpoint_ingest.core.validation import Drive
 from trigpoint_ingest.journal import Journal
 from trigpoint_ingest.settings import IngestSettings
 
-TAKEN_AT_ONCE, TAKEN_AT_ONCE_BYTES = 512, 1024 * 1024  # before it is looked at what is due
+TAKEN_AT_ONCE, TAKEN_AT_ONCE_BYTES = 256, 1024 * 1024  # before it is looked at what is due
 CUT_OFF_S = 10.0  # a vehicle with something missing that is silent for so long has no link, and sends it again later
 HANDED_ON_COUNT, HANDED_ON_BYTES = 2048, 1024 * 1024  # taken, which are handed on before a group is due
 WRONG_SENDER = "wrong sender"

@@ -12,6 +12,7 @@ from trigpoint.bus.attachment import (
     Bytes,
     attachment_columns,
     attachment_table,
+    bundle_stride,
     bundled_count,
     decode_attachment,
     decode_bundle,
@@ -20,6 +21,7 @@ from trigpoint.bus.attachment import (
 )
 from trigpoint.bus.ports import UNIDENTIFIED, BusMessage, BusRun
 from trigpoint.errors import InputError
+from trigpoint.events.envelope import EventIdentity
 from trigpoint.events.runs import EncodedRun
 
 
@@ -50,12 +52,39 @@ def messages_of(arrival: Arrival) -> list[BusMessage]:
 def runs_of(arrival: Arrival) -> list[BusRun]:
     """The same, column by column: a run for each stretch of messages of one source, boot and schema version."""
     bundled = _bundled_table(arrival)
-    if bundled is None:
-        return list(runs_of_messages(messages_of(arrival)))
-    table, payloads = bundled
+    run = None if bundled is None else _run_of_table(arrival, *bundled)
+    return list(runs_of_messages(messages_of(arrival))) if run is None else [run]
+
+
+def runs_of_key(arrivals: Sequence[Arrival]) -> Iterator[BusRun]:
+    """What transmissions of one key and schema hold, in their order: bundles in one run where they make one."""
+    for stride, stretch in groupby(arrivals, key=_stride):
+        bundles = list(stretch)
+        together = _run_of_all(bundles) if stride and len(bundles) > 1 else None
+        if together is not None:
+            yield together
+        else:
+            yield from (run for bundle in bundles for run in runs_of(bundle))
+
+
+def _stride(arrival: Arrival) -> int:
+    """Bytes of a bundle's messages, where all may be as long as the first; 0 for any other transmission."""
+    return bundle_stride(arrival.payload) if is_bundle(arrival.attachment) else 0
+
+
+def _run_of_all(bundles: Sequence[Arrival]) -> BusRun | None:
+    """Bundles of one key, schema and stride as one run; None where they are not of one drive and schema version."""
+    if sum(bundle.count for bundle in bundles) > BUNDLE_LIMIT:
+        return None
+    table = uniform_bundle(b"".join(bundle.payload for bundle in bundles))
+    return None if table is None else _run_of_table(bundles[0], *table)
+
+
+def _run_of_table(arrival: Arrival, table: Bytes, payloads: Sequence[bytes]) -> BusRun | None:
+    """Messages with these attachments (n, L), on the key of an arrival; None where they do not make one run."""
     columns = attachment_columns(table)
     if columns is None:
-        return list(runs_of_messages(messages_of(arrival)))
+        return None
     identity, schema_version, sequences, stamps_ns = columns
     run = EncodedRun(
         source=identity.source,
@@ -66,13 +95,30 @@ def runs_of(arrival: Arrival) -> list[BusRun]:
         stamps_ns=stamps_ns,
         payloads=payloads,
     )
-    return [BusRun(arrival.key, schema_version, run)]
+    return BusRun(arrival.key, schema_version, run)
 
 
 def runs_of_messages(messages: Sequence[BusMessage]) -> Iterator[BusRun]:
     """Messages as runs, in their order."""
     for _, stretch in groupby(messages, key=_shared):
         yield run_of_messages(list(stretch))
+
+
+def messages_of_run(run: BusRun) -> Iterator[BusMessage]:
+    """The messages of a run, in their order."""
+    rows = run.run
+    columns = zip(
+        rows.schema_of_row.tolist(), rows.sequences.tolist(), rows.stamps_ns.tolist(), rows.payloads, strict=True
+    )
+    for schema, sequence, stamp_ns, payload in columns:
+        yield BusMessage(
+            key=run.key,
+            schema_name=rows.schemas[schema],
+            payload=payload,
+            identity=EventIdentity(rows.source, rows.boot_id, sequence),
+            stamp_ns=stamp_ns,
+            schema_version=run.schema_version,
+        )
 
 
 def run_of_messages(messages: Sequence[BusMessage]) -> BusRun:

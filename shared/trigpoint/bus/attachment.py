@@ -91,15 +91,22 @@ def decode_bundle(payload: bytes) -> tuple[list[bytes], list[bytes]]:
     return attachments, payloads
 
 
+def bundle_stride(payload: bytes) -> int:
+    """How long each message of a bundle is, with its lengths and attachment, if all are as long as the first; 0 if
+    they cannot be."""
+    if len(payload) < _LENGTHS.size:
+        return 0
+    attachment_length, payload_length = _LENGTHS.unpack_from(payload)
+    stride: int = _LENGTHS.size + attachment_length + payload_length
+    return 0 if len(payload) % stride else stride
+
+
 def uniform_bundle(payload: bytes) -> tuple[Bytes, list[bytes]] | None:
     """Attachments (n, L) and payloads of a bundle of messages that are all as long as the first; None for another."""
-    if len(payload) < _LENGTHS.size:
+    stride = bundle_stride(payload)
+    if not stride:
         return None
-    attachment_length, payload_length = _LENGTHS.unpack_from(payload)
-    payload_at = _LENGTHS.size + attachment_length
-    stride = payload_at + payload_length
-    if len(payload) % stride:
-        return None
+    payload_at = _LENGTHS.size + _LENGTHS.unpack_from(payload)[0]
     table = np.frombuffer(payload, dtype=np.uint8).reshape(-1, stride)
     if (table[:, : _LENGTHS.size] != table[0, : _LENGTHS.size]).any():
         return None

@@ -63,6 +63,23 @@ class Inbox(Generic[ItemT]):
             self._held_bytes -= size_bytes
         return item
 
+    def take_more(self, *, count: int, size_bytes: int) -> list[ItemT]:
+        """The oldest items, in order: those that wait now, until they are `count` messages or `size_bytes`."""
+        taken: list[ItemT] = []
+        taken_count = taken_bytes = 0
+        with contextlib.suppress(queue.Empty):
+            while taken_count < count and taken_bytes < size_bytes and not self._closed.is_set():
+                held = self._items.get_nowait()
+                if held is None:
+                    break
+                taken.append(held[0])
+                taken_count += held[1]
+                taken_bytes += held[2]
+        with self._lock:
+            self._held -= taken_count
+            self._held_bytes -= taken_bytes
+        return taken
+
     def close(self) -> list[ItemT]:
         """What was still waiting; nothing more comes in or out, and a `take` that waits returns None."""
         self._closed.set()

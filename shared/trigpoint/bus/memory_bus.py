@@ -5,13 +5,12 @@ from collections.abc import Sequence
 from types import TracebackType
 from typing import Self
 
-from trigpoint.bus.arrivals import run_of_messages
+from trigpoint.bus.arrivals import messages_of_run, run_of_messages
 from trigpoint.bus.inbox import INBOX_CAPACITY, Inbox
 from trigpoint.bus.key_expressions import checked_expression, checked_key, key_matches
 from trigpoint.bus.memory_queries import MemoryQueryable, MemoryQueryables
 from trigpoint.bus.ports import BusMessage, BusRun, Content, Replies
 from trigpoint.errors import ServiceError
-from trigpoint.events.envelope import EventIdentity
 
 
 class MemorySubscription:
@@ -136,20 +135,7 @@ class MemoryBus:
 
     def publish_run(self, run: BusRun) -> None:
         """Each message of the run queued with every subscription that matches its key."""
-        rows = run.run
-        for sequence, stamp_ns, payload in zip(
-            rows.sequences.tolist(), rows.stamps_ns.tolist(), rows.payloads, strict=True
-        ):
-            self.publish(
-                BusMessage(
-                    key=run.key,
-                    schema_name=rows.schemas[0],
-                    payload=payload,
-                    identity=EventIdentity(rows.source, rows.boot_id, sequence),
-                    stamp_ns=stamp_ns,
-                    schema_version=run.schema_version,
-                )
-            )
+        self.publish_all(list(messages_of_run(run)))
 
     def claim(self, key: str) -> MemoryClaim:
         """The key claimed on the exchange."""

@@ -129,7 +129,8 @@ class Subscription(Protocol):
         """The next message, or None if none came within `timeout_s` or the subscription is closed."""
 
     def receive_run(self, timeout_s: float) -> BusRun | None:
-        """The next messages that came together, or None as `receive`; a message is received once, by either."""
+        """The messages of the key that waits longest, many at once, or None as `receive`; a message is received once,
+        by either. Only messages of one key keep their order."""
 
     def close(self) -> None:
         """No more messages; ones not yet received are dropped."""

@@ -11,7 +11,7 @@ from typing import Literal, Self, cast
 
 import zenoh
 
-from trigpoint.bus.arrivals import Arrival, messages_of, runs_of, runs_of_messages
+from trigpoint.bus.arrivals import Arrival, messages_of, messages_of_run, runs_of_key, runs_of_messages
 from trigpoint.bus.attachment import encode_attachment, encode_bundle, run_attachments
 from trigpoint.bus.inbox import INBOX_BYTES, INBOX_CAPACITY, Inbox
 from trigpoint.bus.key_expressions import checked_expression, checked_key
@@ -22,6 +22,7 @@ from trigpoint.errors import InputError, ServiceError
 
 BUNDLE_COUNT = 256  # messages in a transmission: some 15 kB of IMU, below the 64 kB a Zenoh batch holds
 BUNDLE_BYTES = 64 * 1024  # of payload in a transmission of more than one message
+TOGETHER_COUNT, TOGETHER_BYTES = 2048, 1024 * 1024  # received at a time as runs
 ARRIVAL_BYTES = 512  # a transmission in memory, besides its payload
 CLAIM_LOOK_S = 5.0  # for the claims of everyone reachable; the answer comes in milliseconds
 
@@ -80,6 +81,8 @@ class ZenohSubscription:
         self._inbox = inbox
         self._unpacked: deque[BusMessage] = deque()
         self._runs: deque[BusRun] = deque()
+        self._by_key: dict[tuple[str, str], list[Arrival]] = {}
+        self._gathered = 0  # messages in them
         self._subscriber = session.declare_subscriber(key_expression, self._arrived)
 
     def _arrived(self, sample: zenoh.Sample) -> None:
@@ -97,10 +100,15 @@ class ZenohSubscription:
     @property
     def waiting(self) -> int:
         """How many messages wait to be received."""
-        return self._inbox.held + len(self._unpacked) + sum(len(run.run) for run in self._runs)
+        return self._inbox.held + self._gathered + len(self._unpacked) + sum(len(run.run) for run in self._runs)
 
     def receive(self, timeout_s: float) -> BusMessage | None:
         """The next message, or None if none came within `timeout_s` or the subscription is closed."""
+        if not self._unpacked:
+            self._unpacked.extend(message for run in self._runs for message in messages_of_run(run))
+            for arrivals in self._by_key.values():
+                self._unpacked.extend(message for arrival in arrivals for message in messages_of(arrival))
+            self._forget_runs()
         if not self._unpacked:
             arrival = self._inbox.take(timeout_s)
             if arrival is None:
@@ -109,22 +117,38 @@ class ZenohSubscription:
         return self._unpacked.popleft()
 
     def receive_run(self, timeout_s: float) -> BusRun | None:
-        """The next messages that came together, or None if none came within `timeout_s` or it is closed."""
+        """The messages of the key that waits longest, or None if none came within `timeout_s` or it is closed."""
         if self._unpacked:
             self._runs.extend(runs_of_messages(self._unpacked))
             self._unpacked.clear()
         if not self._runs:
-            arrival = self._inbox.take(timeout_s)
-            if arrival is None:
+            self._gather(timeout_s)
+            if not self._by_key:
                 return None
-            self._runs.extend(runs_of(arrival))
+            arrivals = self._by_key.pop(next(iter(self._by_key)))
+            self._gathered -= sum(arrival.count for arrival in arrivals)
+            self._runs.extend(runs_of_key(arrivals))
         return self._runs.popleft()
+
+    def _gather(self, timeout_s: float) -> None:
+        """What waits sorted by its key, the key that waits longest first; the first may take until the timeout."""
+        first = None if self._by_key else self._inbox.take(timeout_s)
+        room = TOGETHER_COUNT - self._gathered
+        more = self._inbox.take_more(count=room, size_bytes=TOGETHER_BYTES)
+        for arrival in more if first is None else (first, *more):
+            self._by_key.setdefault((arrival.key, arrival.schema_name), []).append(arrival)
+            self._gathered += arrival.count
+
+    def _forget_runs(self) -> None:
+        self._runs.clear()
+        self._by_key.clear()
+        self._gathered = 0
 
     def close(self) -> None:
         """No more messages; ones not yet received are dropped."""
         self._inbox.close()
         self._unpacked.clear()
-        self._runs.clear()
+        self._forget_runs()
         with contextlib.suppress(zenoh.ZError):  # already undeclared, or its session is gone
             self._subscriber.undeclare()  # type: ignore[no-untyped-call]
 

@@ -9,7 +9,7 @@ from contextlib import ExitStack
 import pytest
 
 from command_runs.processes import wait_until
-from trigpoint.bus.arrivals import run_of_messages
+from trigpoint.bus.arrivals import messages_of_run, run_of_messages
 from trigpoint.bus.memory_bus import MemoryBus, MemoryExchange
 from trigpoint.bus.ports import UNIDENTIFIED, Bus, BusMessage, Content, Query, Queryable, Replies, Reply, Subscription
 from trigpoint.bus.zenoh_bus import ZenohBus, ZenohSettings
@@ -75,18 +75,7 @@ def until_claimed(bus: Bus, expression: str, keys: tuple[str, ...]) -> None:
 def received_in_runs(subscription: Subscription, count: int) -> list[BusMessage]:
     received: list[BusMessage] = []
     while len(received) < count and (found := subscription.receive_run(SOON_S)) is not None:
-        rows = found.run
-        for sequence, stamp_ns, payload in zip(rows.sequences, rows.stamps_ns, rows.payloads, strict=True):
-            received.append(
-                BusMessage(
-                    key=found.key,
-                    schema_name=rows.schemas[int(rows.schema_of_row[0])],
-                    payload=payload,
-                    identity=EventIdentity(rows.source, rows.boot_id, int(sequence)),
-                    stamp_ns=int(stamp_ns),
-                    schema_version=found.schema_version,
-                )
-            )
+        received += messages_of_run(found)
     return received
 
 
@@ -150,6 +139,35 @@ def test_the_rest_of_a_bundle_can_be_received_as_a_run(pair: tuple[Bus, Bus]) ->
     publisher.publish_all(sent)
     first = all_received(subscription, 1)
     assert first + received_in_runs(subscription, len(sent) - 1) == sent
+
+
+def test_runs_of_several_keys_keep_each_keys_order(pair: tuple[Bus, Bus]) -> None:
+    publisher, listener = pair
+    subscription = listener.subscribe("t/*")
+    until_heard(publisher, "t/a")
+    sent = [message(f"t/{'ab'[sequence % 2]}", sequence) for sequence in range(SMALL_INBOX)]
+    for item in sent:
+        publisher.publish(item)
+    until_waiting(subscription, len(sent))
+    received = received_in_runs(subscription, len(sent))
+    assert [item for item in received if item.key == "t/a"] == sent[0::2]
+    assert [item for item in received if item.key == "t/b"] == sent[1::2]
+
+
+def test_what_is_left_of_runs_can_be_received_one_by_one(pair: tuple[Bus, Bus]) -> None:
+    publisher, listener = pair
+    subscription = listener.subscribe("t/*")
+    until_heard(publisher, "t/a")
+    sent = [message(f"t/{'ab'[sequence % 2]}", sequence) for sequence in range(SMALL_INBOX)]
+    for item in sent:
+        publisher.publish(item)
+    until_waiting(subscription, len(sent))
+    received = received_in_runs(subscription, 1)
+    assert subscription.waiting == len(sent) - len(received)
+    received += all_received(subscription, len(sent) - len(received))
+    assert [item for item in received if item.key == "t/a"] == sent[0::2]
+    assert [item for item in received if item.key == "t/b"] == sent[1::2]
+    assert subscription.waiting == 0
 
 
 def test_what_waits_is_counted(pair: tuple[Bus, Bus]) -> None:

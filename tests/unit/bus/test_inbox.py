@@ -40,3 +40,28 @@ def test_bytes_taken_out_make_room_for_others() -> None:
     inbox.take(0.0)
     inbox.offer("second", size_bytes=1000)
     assert (inbox.lost, inbox.take(0.0)) == (0, "second")
+
+
+def test_what_waits_is_taken_until_it_is_enough() -> None:
+    inbox: Inbox[str] = Inbox(10)
+    for item in "abcd":
+        inbox.offer(item, count=2, size_bytes=5)
+    assert inbox.take_more(count=3, size_bytes=100) == ["a", "b"]
+    assert inbox.take_more(count=100, size_bytes=5) == ["c"]
+    assert (inbox.take_more(count=0, size_bytes=5), inbox.held) == ([], 2)
+
+
+def test_what_was_taken_together_makes_room_again() -> None:
+    inbox: Inbox[str] = Inbox(2, capacity_bytes=10)
+    inbox.offer("first", count=1, size_bytes=5)
+    inbox.offer("second", count=1, size_bytes=5)
+    assert inbox.take_more(count=10, size_bytes=100) == ["first", "second"]
+    inbox.offer("third", count=1, size_bytes=10)
+    assert (inbox.take(0.0), inbox.lost) == ("third", 0)
+
+
+def test_nothing_is_taken_together_once_closed() -> None:
+    inbox: Inbox[str] = Inbox()
+    inbox.offer("kept")
+    inbox.close()
+    assert inbox.take_more(count=10, size_bytes=10) == []
