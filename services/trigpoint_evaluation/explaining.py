@@ -26,6 +26,7 @@ from trigpoint_evaluation.core.explanation import (
     corrections_behind,
     detection_of,
     moves_of,
+    rows_behind,
     sensor_pose,
     sweeps_of,
 )
@@ -60,19 +61,21 @@ def explained(log: EventLog, store: LandmarkStore, landmark: str, *, as_of: int 
         raise InputError(_absence(store, landmark, history, map_version))
     before = tuple(one for one in history if one.valid_from_version <= map_version)
     parts = _parts_of(log, versions, row, map_version)
+    whole = _whole_below(versions, map_version).map_version
+    seen_by = sweeps_of(rows_behind(history, whole=whole, map_version=map_version))
     sightings = tuple(
-        sighting for drive, sweeps in sweeps_of(row).items() for sighting in _seen(log, row, drive, sweeps, parts)
+        sighting for drive, sweeps in seen_by.items() for sighting in _seen(log, row, drive, sweeps, parts)
     )
     return Explanation(
         landmark=row,
         map_version=map_version,
         sightings=tuple(sorted(sightings, key=lambda one: (one.stamp_ns, one.vehicle))),
-        missing=sum(map(len, sweeps_of(row).values())) - len(sightings),
+        missing=sum(map(len, seen_by.values())) - len(sightings),
         anchors=tuple(_tied_anchor(event, position, parts) for event, position in parts.tied.values()),
         corrections=corrections_behind(
             _corrections(log),
             anchors=_anchors_ever(log, versions, before, parts),
-            drives={drive for one in before for drive in sweeps_of(one)},
+            drives=set(sweeps_of(before)),
             read=_read_corrections(versions, map_version),
         ),
         moves=moves_of(before),
@@ -98,10 +101,8 @@ def _absence(store: LandmarkStore, landmark: str, history: Sequence[Landmark], m
 def _parts_of(log: EventLog, versions: Sequence[MapVersion], row: Landmark, map_version: int) -> _Parts:
     """The paths and associations behind a row. Versions that say only what changed have no paths of what was driven
     since: that of the next whole one tells as well which of a sweep's detections is the landmark."""
-    parts, by_number = _Parts(), {version.map_version: version for version in versions}
-    whole = at = by_number[map_version]
-    while whole.base_version in by_number:
-        whole = by_number[whole.base_version]
+    parts, whole = _Parts(), _whole_below(versions, map_version)
+    at = next(version for version in versions if version.map_version == map_version)
     for logged in _rows_between(log, versions, whole, at):
         _take(parts, logged, row.landmark)
     following = (one for one in versions if one.map_version > map_version and not one.base_version)
@@ -110,6 +111,15 @@ def _parts_of(log: EventLog, versions: Sequence[MapVersion], row: Landmark, map_
         for logged in _rows_between(log, versions, later, later, kinds=(MapSolved, TrajectorySolved)):
             _take(parts, logged, row.landmark)
     return parts
+
+
+def _whole_below(versions: Sequence[MapVersion], map_version: int) -> MapVersion:
+    """The version that one is based on in the end: itself, if it is upon no other."""
+    by_number = {version.map_version: version for version in versions}
+    whole = by_number[map_version]
+    while whole.base_version in by_number:
+        whole = by_number[whole.base_version]
+    return whole
 
 
 def _rows_between(

@@ -24,7 +24,7 @@ from trigpoint.landmarks.queries import LandmarkQuery
 from trigpoint.logs.following import RunFollower
 from trigpoint.logs.ports import EventLog
 from trigpoint.logs.readings import logged_frame
-from trigpoint_landmarks.core.rows import labels_within, make_valid, map_change
+from trigpoint_landmarks.core.rows import held, labels_within, make_valid, map_change
 from trigpoint_landmarks.core.versions import OpenVersion, SolvedVersion, refusal_of
 
 MAP_STREAM = STREAM_PATTERNS[MapSolved]
@@ -55,7 +55,7 @@ class Projector:
     def __init__(self, log: EventLog, store: LandmarkStore, *, refused: Refused) -> None:
         self._log, self._store, self._refused = log, store, refused
         self._checkpoint = store.checkpoint()
-        self._valid: dict[str, Landmark] = {row.landmark: row for row in store.landmarks(LandmarkQuery())}
+        self._valid: dict[str, Landmark] = {row.landmark: held(row) for row in store.landmarks(LandmarkQuery())}
         self._newest = max((version.map_version for version in store.map_versions()), default=0)
         self.next_number = self._checkpoint.next_number(MAP_STREAM)  # of the first event not taken
         self._follower = RunFollower(log, MAP_STREAM, first_number=self.next_number, kinds=KINDS)

@@ -88,14 +88,27 @@ class Explanation:
     moves: tuple[Move, ...]
 
 
-def sweeps_of(landmark: Landmark) -> dict[DriveName, list[int]]:
-    """The sequences of the sweeps that saw a landmark, by drive."""
-    provenance: dict[str, list[int]] = json.loads(landmark.provenance)
-    return {(vehicle, boot_id): sweeps for (vehicle, _, boot_id), sweeps in _parted(provenance.items())}
+def sweeps_of(rows: Iterable[Landmark]) -> dict[DriveName, list[int]]:
+    """The sequences of the sweeps that saw a landmark according to some of its rows, by drive, each once."""
+    sweeps: dict[DriveName, dict[int, None]] = {}
+    for row in rows:
+        for drive, sequences in json.loads(row.provenance).items():
+            vehicle, _, boot_id = drive.partition("/")
+            sweeps.setdefault((vehicle, boot_id), {}).update(dict.fromkeys(sequences))
+    return {drive: list(sequences) for drive, sequences in sweeps.items()}
 
 
-def _parted(items: Iterable[tuple[str, list[int]]]) -> Iterable[tuple[tuple[str, str, str], list[int]]]:
-    return ((drive.partition("/"), sweeps) for drive, sweeps in items)
+def rows_behind(history: Sequence[Landmark], *, whole: int, map_version: int) -> list[Landmark]:
+    """A landmark's rows, in order of version, that tell together what saw it up to a version: from the one in the
+    version `whole`, which is upon no other, or from when it came into the map last."""
+    rows: list[Landmark] = []
+    for row in reversed([row for row in history if row.valid_from_version <= map_version]):
+        if rows and row.valid_to_version != rows[-1].valid_from_version:
+            break
+        rows.append(row)
+        if row.valid_from_version <= whole:
+            break
+    return rows[::-1]
 
 
 def moves_of(history: Sequence[Landmark]) -> tuple[Move, ...]:

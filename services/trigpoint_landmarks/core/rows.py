@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from hashlib import blake2b
 from itertools import repeat
 
 import numpy as np
@@ -22,12 +23,12 @@ from trigpoint.landmarks.model import (
     MapChange,
     MapVersion,
     Trajectory,
-    joined_provenance,
     provenance_json,
 )
 from trigpoint_landmarks.core.versions import SolvedVersion
 
 Floats = NDArray[np.float64]
+UNSEEN = provenance_json(())
 Labels = Mapping[tuple[str, str], AnchorLabelled]  # by name and image
 
 
@@ -45,15 +46,13 @@ def labels_within(
 
 
 def map_change(version: SolvedVersion, *, frame: MapFrame, labels: Labels, valid: Mapping[str, Landmark]) -> MapChange:
-    """What a version changes in a map whose valid landmarks are `valid`, by id.
+    """What a version changes in a map whose valid landmarks are `valid`, by id, as `held` has them.
 
     A landmark solved exactly as before keeps its row; any other is closed, and opened anew if it is still there. Of a
     version that is a change of the one before, landmarks it does not name keep theirs too.
     """
     removed = frozenset(version.solved.removed) if version.solved.base_version else frozenset()
     rows = landmark_rows(_without(version.landmarks, removed), frame)
-    if version.solved.base_version:
-        rows = [_seen_more(valid.get(row.landmark), row) for row in rows]
     solved = {row.landmark: row for row in rows}
     kept = {name for name, row in solved.items() if name in valid and _is_same(valid[name], row)}
     gone: Iterable[str] = (*solved, *removed) if version.solved.base_version else valid
@@ -72,7 +71,12 @@ def make_valid(valid: dict[str, Landmark], change: MapChange) -> None:
     for name in change.closed:
         del valid[name]
     for row in change.opened:
-        valid[row.landmark] = row
+        valid[row.landmark] = held(row)
+
+
+def held(row: Landmark) -> Landmark:
+    """A row as it is kept in memory: a fingerprint in place of what saw it, which is most of it and grows for ever."""
+    return row._replace(provenance=blake2b(row.provenance.encode(), digest_size=16).hexdigest())
 
 
 def landmark_rows(solved: SolvedLandmarks, frame: MapFrame) -> list[Landmark]:
@@ -103,13 +107,6 @@ def landmark_rows(solved: SolvedLandmarks, frame: MapFrame) -> list[Landmark]:
     return list(map(Landmark._make, rows))
 
 
-def _seen_more(before: Landmark | None, row: Landmark) -> Landmark:
-    """The row of a version upon another, which has the observations since, with those before."""
-    if before is None or before.provenance == row.provenance:
-        return row
-    return row._replace(provenance=joined_provenance(before.provenance, row.provenance))
-
-
 def _without(solved: SolvedLandmarks, removed: frozenset[str]) -> SolvedLandmarks:
     if removed.isdisjoint(solved.landmarks):
         return solved
@@ -123,10 +120,12 @@ def _provenances(observations: Sequence[Observations]) -> Iterator[str]:
     return (texts[id(one)] for one in observations)
 
 
-def _is_same(held: Landmark, solved: Landmark) -> bool:
-    if held.x_m != solved.x_m or held.y_m != solved.y_m:
+def _is_same(known: Landmark, solved: Landmark) -> bool:
+    """Whether a row says what one that is held says; a version upon another may have seen nothing more of it."""
+    if known.x_m != solved.x_m or known.y_m != solved.y_m:
         return False  # hardly ever are all others compared
-    return held.says_the_same_as(solved)
+    is_unseen_since = solved.provenance == UNSEEN
+    return known.says_the_same_as(solved._replace(provenance=known.provenance) if is_unseen_since else held(solved))
 
 
 def _version_row(version: SolvedVersion, frame: MapFrame) -> MapVersion:

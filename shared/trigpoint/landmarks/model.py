@@ -46,7 +46,8 @@ class Landmark(NamedTuple):
     `landmark` is its id, stable between versions. x, y in the map frame; easting, northing in the map's CRS;
     latitude and longitude on WGS84. Variances and covariance along grid east (x) and grid north (y); sigma_* are
     the semi-axes of the 1-sigma ellipse, `ellipse_heading_rad` of the longer one counter-clockwise from grid east.
-    `provenance` is JSON, {"vehicle/boot": [sequences of the sweeps that saw it]}. `valid_to_version` None: still valid.
+    `provenance` is JSON, {"vehicle/boot": [sequences of the sweeps that saw it]}; in a version upon another, of those
+    that did since the landmark's row before, else of all. `valid_to_version` None: still valid.
 
     A named tuple because a million of them are made, compared and copied in one replay; it is made by keyword.
     """
@@ -198,16 +199,6 @@ def provenance_json(observations: Sequence[tuple[str, str, int]]) -> str:
         by_drive.setdefault((vehicle, boot_id), []).append(sequence)
     # A list of whole numbers reads the same in JSON as in Python; there are too many of these for an encoder.
     return "{" + ", ".join(f"{_drive_json(drive)}: {sequences}" for drive, sequences in by_drive.items()) + "}"
-
-
-def joined_provenance(before: str, since: str) -> str:
-    """The text of observations (as `provenance_json`) and of those since, each once."""
-    if before == since or since == "{}":
-        return before
-    joined: dict[str, list[int]] = json.loads(before)
-    for drive, sequences in json.loads(since).items():
-        joined[drive] = list(dict.fromkeys((*joined.get(drive, ()), *sequences)))
-    return "{" + ", ".join(f"{json.dumps(drive, ensure_ascii=False)}: {each}" for drive, each in joined.items()) + "}"
 
 
 @lru_cache(maxsize=4096)

@@ -201,7 +201,7 @@ def test_an_anchor_let_go_by_a_later_change_is_tied_no_more_and_a_path_comes_fro
     tied = replace(associated("anchor-1", "L1"), image="tile-1")
     append_mapped(log, [landmark, tied, closing(1, 1)])
     change = replace(closing(2, 1), base_version=1)
-    since = replace(landmark, map_version=2, observations=())  # seen no more since
+    since = replace(landmark, map_version=2, position_m=landmark.position_m + 0.1, observations=())  # moved, not seen
     append_mapped(log, [since, replace(tied, map_version=2, landmark=""), change])
     append_mapped(
         log, [replace(landmark, map_version=3), solved_trajectory(map_version=3), closing(3, 1)], boot_id="boot-2"

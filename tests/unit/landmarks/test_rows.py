@@ -162,13 +162,34 @@ def test_a_landmark_said_again_just_as_it_was_keeps_its_row() -> None:
     assert (second.opened, second.closed) == ((), ())
 
 
-def test_what_saw_a_landmark_since_comes_on_top_of_what_saw_it_before() -> None:
+def test_a_version_upon_another_says_what_saw_a_landmark_since() -> None:
     seen = replace(solved_landmark("L1", 1.0, 0.0), observations=(("veh-a", "boot-1", 3), ("veh-b", "boot-2", 1)))
-    again = replace(
-        solved_landmark("L1", 2.0, 0.0, map_version=2), observations=(("veh-a", "boot-1", 3), ("veh-a", "boot-1", 7))
-    )
+    again = replace(solved_landmark("L1", 2.0, 0.0, map_version=2), observations=(("veh-a", "boot-1", 7),))
     (row,) = delta(2, [again], removed=(), held=changed(1, [seen])).opened
-    assert row.provenance == '{"veh-a/boot-1": [3, 7], "veh-b/boot-2": [1]}'
+    assert row.provenance == '{"veh-a/boot-1": [7]}'
+
+
+def test_a_landmark_nothing_saw_since_keeps_its_row_until_it_moves() -> None:
+    first = changed(1, [replace(solved_landmark("L1", 1.0, 0.0), observations=(("veh-a", "boot-1", 3),))])
+    still = replace(solved_landmark("L1", 1.0, 0.0, map_version=2), observations=())
+    assert delta(2, [still], removed=(), held=first).opened == ()
+    moved = replace(solved_landmark("L1", 1.5, 0.0, map_version=2), observations=())
+    assert [row.provenance for row in delta(2, [moved], removed=(), held=first).opened] == ["{}"]
+
+
+def test_a_landmark_that_others_saw_gets_a_row_of_its_own() -> None:
+    first = changed(1, [replace(solved_landmark("L1", 1.0, 0.0), observations=(("veh-a", "boot-1", 3),))])
+    again = replace(solved_landmark("L1", 1.0, 0.0, map_version=2), observations=(("veh-a", "boot-1", 4),))
+    assert len(delta(2, [again], removed=(), held=first).opened) == 1
+
+
+def test_what_is_held_of_a_landmark_does_not_grow_with_what_saw_it() -> None:
+    few, many = (
+        replace(solved_landmark("L1", 1.0, 0.0), observations=tuple(("veh-a", "boot-1", n) for n in range(count)))
+        for count in (1, 1000)
+    )
+    sizes = [len(valid_with(changed(1, [one]))["L1"].provenance) for one in (few, many)]
+    assert sizes[0] == sizes[1]
 
 
 def test_a_whole_version_says_everything_that_saw_a_landmark() -> None:
