@@ -63,7 +63,6 @@ class LiveMap:
         self._drives: dict[DriveName, DriveInMap] = {}
         self._touched: set[int] = set()
         self._nis: deque[float] = deque(maxlen=NIS_KEPT)
-        self._fix_nis: deque[float] = deque(maxlen=NIS_KEPT)
         self._conflicts = 0
 
     @property
@@ -79,9 +78,8 @@ class LiveMap:
     @property
     def doubt(self) -> str:
         """Why the map should be solved as a whole, empty where nothing contradicts it."""
-        for what, nis in (("sightings", self._nis), ("fixes", self._fix_nis)):
-            if len(nis) >= NIS_ENOUGH and float(np.mean(nis)) > NIS_LIMIT:
-                return f"{what} are off by a mean chi-square of {np.mean(nis):.1f}: {NIS_LIMIT:g} is the limit"
+        if len(self._nis) >= NIS_ENOUGH and float(np.mean(self._nis)) > NIS_LIMIT:
+            return f"sightings are off by a mean chi-square of {np.mean(self._nis):.1f}: {NIS_LIMIT:g} is the limit"
         if self._conflicts >= CONFLICTS_LIMIT:
             return f"{self._conflicts} tracks had to leave their landmark: {CONFLICTS_LIMIT} is the limit"
         return ""
