@@ -1,0 +1,8 @@
+"""`trigpoint export qgis`."""
+
+import click
+
+
+@click.command("qgis")
+def qgis() -> None:
+    """x"""
