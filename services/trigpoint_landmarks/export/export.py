@@ -5,12 +5,11 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from trigpoint.landmarks.feature_crs import FeatureCrs
+from trigpoint.landmarks.geopackage_writing import KINDS_MOST
 from trigpoint.landmarks.layers import Layer
 from trigpoint_landmarks.export.placed import PlacedFeature
 from trigpoint_landmarks.export.provenance import Provenance
 from trigpoint_landmarks.export.reading import Batch
-
-KINDS_MOST = 24  # that get a colour of their own
 
 
 class Batches(Protocol):

@@ -1,11 +1,12 @@
 """Writes a GeoPackage (OGC 12-128r18, version 1.3) of plain tables to hand over: indexed, styled, with its metadata."""
 
 import sqlite3
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from trigpoint.errors import InputError
 from trigpoint.geodesy.projection import WGS84, crs_wkt2
 from trigpoint.landmarks import geopackage_schema as schema
 from trigpoint.landmarks.geopackage_file import SQL_FUNCTIONS, database_errors
@@ -14,6 +15,7 @@ from trigpoint.landmarks.geopackage_geometry import encoded_line, encoded_point
 Points = tuple[tuple[float, float], ...]
 Row = tuple[Points, Sequence[object]]  # one point: a point, more: a line, none: no geometry; then a value a column
 
+KINDS_MOST = 24  # of a table that get a colour of their own
 USER_VERSION = 10300  # 1.3, which GDAL 3.6 and QGIS 3.22 read without a warning
 REFERENCES_TABLE = """CREATE TABLE gpkg_spatial_ref_sys (srs_name TEXT NOT NULL, srs_id INTEGER NOT NULL PRIMARY KEY,
 organization TEXT NOT NULL, organization_coordsys_id INTEGER NOT NULL, definition TEXT NOT NULL, description TEXT,
@@ -175,3 +177,62 @@ def written_geopackage(path: Path, *, crs: str, epoch: float | None, changed: st
             driver.execute("COMMIT")
     finally:
         driver.close()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HandedOver:
+    """What a GeoPackage to hand over holds: its tables, their CRS, the box around them in it, and its metadata."""
+
+    tables: tuple[str, ...]
+    crs: str
+    extent: tuple[float, float, float, float] | None
+    kinds: Mapping[str, tuple[str, ...]]
+    metadata: str
+
+
+def read_handed_over(path: Path) -> HandedOver:
+    """The contents of a file that `written_geopackage` wrote. Raises InputError for any other file."""
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    with database_errors(path), closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as driver:
+        names = {name for (name,) in driver.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+        if not {"gpkg_metadata", "layer_styles"} <= names:
+            raise InputError(f"{path} is not a GeoPackage of `trigpoint export gpkg`, which has metadata and styles")
+        held = driver.execute(
+            "SELECT table_name, min_x, min_y, max_x, max_y FROM gpkg_contents WHERE table_name != ?", ("layer_styles",)
+        ).fetchall()
+        metadata = driver.execute("SELECT metadata FROM gpkg_metadata WHERE id = 1").fetchone()
+        code = driver.execute(
+            "SELECT srs_id, definition FROM gpkg_spatial_ref_sys JOIN gpkg_geometry_columns USING (srs_id) LIMIT 1"
+        ).fetchone()
+        tables = tuple(name for name, *_ in held)
+        kinds = {name: _kinds(driver, name) for name in tables if _has_kind(driver, name)}
+    if metadata is None or code is None:
+        raise InputError(f"{path}: no metadata or no places in it: `trigpoint export gpkg` writes both")
+    srs_id, definition = code
+    boxes = [box for _, *box in held if box[0] is not None]
+    return HandedOver(
+        tables=tables,
+        crs=f"EPSG:{srs_id}" if 0 < srs_id < schema.FIRST_PRIVATE_SRS_ID else str(definition),
+        extent=_around(boxes),
+        kinds=kinds,
+        metadata=metadata[0],
+    )
+
+
+def _has_kind(driver: sqlite3.Connection, table: str) -> bool:
+    return any(row[1] == "kind" for row in driver.execute("SELECT cid, name FROM pragma_table_info(?)", (table,)))
+
+
+def _kinds(driver: sqlite3.Connection, table: str) -> tuple[str, ...]:
+    quoted = table.replace('"', '""')
+    return tuple(
+        kind for (kind,) in driver.execute(f'SELECT DISTINCT kind FROM "{quoted}" ORDER BY kind LIMIT {KINDS_MOST}')
+    )
+
+
+def _around(boxes: Sequence[Sequence[float]]) -> tuple[float, float, float, float] | None:
+    if not boxes:
+        return None
+    west, south, east, north = zip(*boxes, strict=True)
+    return min(west), min(south), max(east), max(north)
