@@ -54,10 +54,13 @@ FORMATS: Mapping[str, Format] = {
 def write_file(form: Format, path: Path, export: Export, *, force: bool) -> tuple[Path, ...]:
     """The files written, each whole and on the disk; what is there already is replaced only by `force`.
 
-    Raises InputError for a file that is there, and for what a format cannot hold; OSError where it cannot be written.
+    Raises InputError for a file that is there, a folder that is not, and for what a format cannot hold; OSError where
+    it cannot be written.
     """
     if path.exists() and not force:
         raise InputError(f"{path} is there already: --force replaces it")
+    if not path.parent.is_dir():
+        raise InputError(f"{path.parent}: no such folder")
     with replaced_durably(path) as partial:
         form.write(partial, export)
     beside = () if form.beside is None else tuple(form.beside(path, export))

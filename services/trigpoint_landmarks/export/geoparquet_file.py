@@ -12,7 +12,7 @@ from trigpoint.errors import InputError
 from trigpoint.geodesy.projection import crs_projjson
 from trigpoint.landmarks.geojson import JsonObject
 from trigpoint.landmarks.layers import Layer
-from trigpoint_landmarks.export.columns import cells_of, columns_of
+from trigpoint_landmarks.export.columns import cells_of, columns_of, described
 from trigpoint_landmarks.export.export import Export
 from trigpoint_landmarks.export.placed import Points
 from trigpoint_landmarks.export.reading import Batch
@@ -30,13 +30,12 @@ def write_geoparquet(path: Path, export: Export) -> None:
         raise InputError(f"layer {layer.name} has no geometry, which GeoParquet needs: csv, geojson and gpkg hold it")
     schema = _schema(layer)
     bounds = _Bounds()
-    with pq.ParquetWriter(path, schema, compression="zstd") as writer:
+    # Without Arrow's own copy of the schema: with one, Arrow's readers would see none of the metadata added at the end.
+    with pq.ParquetWriter(path, schema, compression="zstd", store_schema=False) as writer:
         for batch in export.features(layer):
             bounds.add(batch)
             writer.write_table(_table(batch, layer, schema))
-        writer.add_key_value_metadata(
-            {"geo": json.dumps(_geo(export, bounds)), "trigpoint": json.dumps(export.provenance.values())}
-        )
+        writer.add_key_value_metadata({"geo": json.dumps(_geo(export, bounds)), "trigpoint": json.dumps(_said(export))})
 
 
 class _Bounds:
@@ -53,11 +52,12 @@ class _Bounds:
 
 
 def _schema(layer: Layer) -> pa.Schema:
-    own = [pa.field(GEOMETRY, pa.binary(), metadata={"description": "WKB"})]
-    columns = [
-        pa.field(one.name, TYPES[one.kind], metadata={"description": one.description}) for one in columns_of(layer)
-    ]
-    return pa.schema([*own, *columns])
+    columns = [pa.field(one.name, TYPES[one.kind]) for one in columns_of(layer)]
+    return pa.schema([pa.field(GEOMETRY, pa.binary()), *columns])
+
+
+def _said(export: Export) -> JsonObject:
+    return {"provenance": export.provenance.values(), "columns": described(columns_of(export.layer))}
 
 
 def _table(batch: Batch, layer: Layer, schema: pa.Schema) -> pa.Table:
