@@ -48,8 +48,8 @@ def _read_parquet(path: Path) -> ReadLayer:
     geo = json.loads(table.schema.metadata[b"geo"])
     values = table.to_pydict()
     places = from_wkb(np.array(values.pop("geometry"), dtype=object))
-    known = geo["columns"]["geometry"]["crs"]["id"]
-    return ReadLayer(values, places, f"{known['authority']}:{known['code']}")
+    crs = geo["columns"]["geometry"]["crs"]
+    return ReadLayer(values, places, f"{crs['id']['authority']}:{crs['id']['code']}" if "id" in crs else crs["name"])
 
 
 def _plain(value: Any, suffix: str) -> Any:

@@ -35,7 +35,7 @@ def main(project_path: str, picture: str, box: str) -> None:
         "read": read,
         "title": project.title(),
         "crs": project.crs().authid(),
-        "layers": {layer.name(): described(layer, project) for layer in layers},
+        "layers": {layer.name(): described(layer, project) for layer in project.mapLayers().values()},
         "errors": drawn(layers, project, picture, [float(side) for side in box.split(",")]),
     }
     sys.stdout.write(json.dumps(said) + "\n")

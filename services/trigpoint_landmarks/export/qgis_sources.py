@@ -13,10 +13,11 @@ import numpy as np
 
 from trigpoint.errors import InputError, ServiceError
 from trigpoint.geodesy.projection import WGS84, transform_coordinates
-from trigpoint.landmarks.feature_crs import EPSG_URI
+from trigpoint.landmarks.feature_crs import CRS84, EPSG_URI
 from trigpoint.landmarks.geopackage_writing import read_handed_over
 from trigpoint.landmarks.layers import ANCHORS, LANDMARKS, LAYERS, TRAJECTORIES, Layer
 from trigpoint_landmarks.export.colours import KNOWN
+from trigpoint_landmarks.export.provenance import crs_name
 from trigpoint_landmarks.export.qgis_project import MERCATOR, Project, ProjectLayer
 
 TOP_DOWN = (ANCHORS, LANDMARKS, TRAJECTORIES)
@@ -59,6 +60,7 @@ def project_of_geopackage(path: Path, *, beside: Path) -> Project:
     """A project in the folder `beside` that opens an exported GeoPackage. Raises InputError for any other file."""
     held = read_handed_over(path)
     provenance = json.loads(held.metadata)
+    crs, map_crs = _known(str(provenance["crs"])), str(provenance["map_crs"])
     relative = Path(os.path.relpath(path.absolute(), beside.absolute()))
     source = f"./{relative.as_posix()}" if not relative.is_absolute() else relative.as_posix()
     named = [layer for layer in (*TOP_DOWN, *LAYERS.values()) if layer.name in held.tables]
@@ -68,7 +70,7 @@ def project_of_geopackage(path: Path, *, beside: Path) -> Project:
             name=layer.title,
             provider="ogr",
             source=f"{source}|layername={layer.name}",
-            crs=held.crs,
+            crs=crs,
             kinds=held.kinds.get(layer.name, ()),
         )
         for layer in dict.fromkeys(named)
@@ -76,11 +78,16 @@ def project_of_geopackage(path: Path, *, beside: Path) -> Project:
     version, epoch = provenance["map_version"], provenance["coordinate_epoch"]
     return Project(
         title=f"Landmark map, version {version}",
-        abstract=f"Map version {version} of {provenance['generator']}, {held.crs}, coordinate epoch {epoch}.",
-        map_crs=str(provenance["map_crs"]),
-        extent=_moved(held.extent, held.crs, str(provenance["map_crs"])),
+        abstract=f"Map version {version} of {provenance['generator']}, {crs}, coordinate epoch {epoch}.",
+        map_crs=map_crs,
+        extent=_moved(held.extent, crs, map_crs),
         layers=layers,
     )
+
+
+def _known(crs: str) -> str:
+    """The name by which a GeoPackage knows a CRS."""
+    return WGS84 if crs == crs_name(CRS84) else crs
 
 
 def _features_of(layer: Layer, address: str, auth: str) -> ProjectLayer:

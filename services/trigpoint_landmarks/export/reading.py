@@ -1,4 +1,4 @@
-"""One map version read layer by layer and page by page: no more than a page of it is in memory, however large it is."""
+"""One map version read layer by layer and page by page: no more than a page of it is in memory."""
 
 import asyncio
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,6 +14,8 @@ from trigpoint.landmarks.queries import DegreeBox, TimeSpan
 from trigpoint_landmarks.export.placed import PlacedFeature, placed, source_crs
 from trigpoint_landmarks.http.drive_pages import drive_page
 from trigpoint_landmarks.http.ports import DriveRow
+
+LINES_A_PAGE = 16  # a path of a long drive has tens of thousands of points
 
 Batch = list[PlacedFeature]
 
@@ -44,7 +46,7 @@ class MapReading:
         asked = source_crs(crs, self._state.crs)
         query = FeatureQuery(
             layer=layer,
-            limit=PAGE_MOST,
+            limit=LINES_A_PAGE if layer.geometry == "LineString" else PAGE_MOST,
             as_of=self.version.map_version,
             areas=() if selection.box is None else (selection.box,),
             condition=selection.conditions.get(layer.name),

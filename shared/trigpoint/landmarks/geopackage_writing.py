@@ -181,10 +181,9 @@ def written_geopackage(path: Path, *, crs: str, epoch: float | None, changed: st
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HandedOver:
-    """What a GeoPackage to hand over holds: its tables, their CRS, the box around them in it, and its metadata."""
+    """What a GeoPackage to hand over holds: tables, the box around them in its CRS, their kinds, and its metadata."""
 
     tables: tuple[str, ...]
-    crs: str
     extent: tuple[float, float, float, float] | None
     kinds: Mapping[str, tuple[str, ...]]
     metadata: str
@@ -202,18 +201,13 @@ def read_handed_over(path: Path) -> HandedOver:
             "SELECT table_name, min_x, min_y, max_x, max_y FROM gpkg_contents WHERE table_name != ?", ("layer_styles",)
         ).fetchall()
         metadata = driver.execute("SELECT metadata FROM gpkg_metadata WHERE id = 1").fetchone()
-        code = driver.execute(
-            "SELECT srs_id, definition FROM gpkg_spatial_ref_sys JOIN gpkg_geometry_columns USING (srs_id) LIMIT 1"
-        ).fetchone()
         tables = tuple(name for name, *_ in held)
         kinds = {name: _kinds(driver, name) for name in tables if _has_kind(driver, name)}
-    if metadata is None or code is None:
-        raise InputError(f"{path}: no metadata or no places in it: `trigpoint export gpkg` writes both")
-    srs_id, definition = code
+    if metadata is None:
+        raise InputError(f"{path}: no metadata in it, which `trigpoint export gpkg` writes")
     boxes = [box for _, *box in held if box[0] is not None]
     return HandedOver(
         tables=tables,
-        crs=f"EPSG:{srs_id}" if 0 < srs_id < schema.FIRST_PRIVATE_SRS_ID else str(definition),
         extent=_around(boxes),
         kinds=kinds,
         metadata=metadata[0],

@@ -6,16 +6,20 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from command_runs.running import trigpoint
 from event_examples.rows import imu_rows
 from exported_maps.examples import fill, map_changes
-from exported_maps.reading import read_layer
-from landmark_maps.examples import checkpoint
+from exported_maps.reading import SUFFIXES, read_layer
+from landmark_maps.examples import change, checkpoint, landmark
+from trigpoint.geodesy.projection import WGS84, transform_coordinates
+from trigpoint.landmarks.geopackage_store import GeoPackageStore
 from trigpoint.landmarks.postgis_store import PostgisStore
 from trigpoint.logs.mcap_log import McapLog
 
+LOCAL = "+proj=tmerc +lat_0=-33.9 +lon_0=151.2 +k=1 +x_0=300000 +y_0=6000000 +datum=WGS84 +units=m +type=crs"
 LAYERS = ("landmarks", "trajectories", "anchors", "image_offsets")
 
 
@@ -67,3 +71,18 @@ def test_a_map_without_a_version_cannot_be_exported(tmp_path: Path) -> None:
     run = trigpoint("export", "gpkg", "--data", tmp_path, "--out", tmp_path / "map.gpkg")
     assert run.status == 2
     assert "no landmark database" in run.err
+
+
+@pytest.mark.parametrize("form", sorted(SUFFIXES))
+def test_a_map_in_a_crs_without_a_code_is_exported_all_the_same(tmp_path: Path, form: str) -> None:
+    own, path = tmp_path / "data", tmp_path / f"map.{SUFFIXES[form]}"
+    own.mkdir()
+    row = landmark("A", 0.0, 0.0)
+    x, y = transform_coordinates(np.array([row.lon_deg]), np.array([row.lat_deg]), source_crs=WGS84, target_crs=LOCAL)
+    with closing(GeoPackageStore(own / "landmarks.gpkg")) as store:
+        placed = row._replace(easting_m=float(x[0]), northing_m=float(y[0]))
+        store.apply(change(1, opened=[placed], crs=LOCAL), checkpoint(1))
+    run = trigpoint("export", form, "--data", own, "--out", path)
+    assert run.status == 0, run.err
+    expected = (row.lon_deg, row.lat_deg) if form in ("geojson", "kml") else (float(x[0]), float(y[0]))
+    assert read_layer(path).places["A"] == pytest.approx(expected, abs=1e-8 if form in ("geojson", "kml") else 1e-3)

@@ -65,15 +65,40 @@ def farthest_m(found: SeenProject) -> float:
     return max(math.dist(places[name], (row.easting_m, row.northing_m)) for name, row in newest().items())
 
 
+def require_true_ellipse(project: SeenProject) -> None:
+    """The ellipse of a landmark is where it is and as large as its covariance has it."""
+    row = newest()["L7"]
+    west, south, east, north = project.layers["Landmarks"]["drawn_m"]["L7"]
+    half_width_m = math.hypot(
+        row.sigma_major_m * math.cos(row.ellipse_heading_rad), row.sigma_minor_m * math.sin(row.ellipse_heading_rad)
+    )
+    half_height_m = math.hypot(
+        row.sigma_major_m * math.sin(row.ellipse_heading_rad), row.sigma_minor_m * math.cos(row.ellipse_heading_rad)
+    )
+    assert (east - west, north - south) == pytest.approx((2 * half_width_m, 2 * half_height_m), abs=ELLIPSE_M)
+    assert ((west + east) / 2, (south + north) / 2) == pytest.approx((row.easting_m, row.northing_m), abs=CENTIMETRE)
+
+
 @in_qgis
 def test_the_project_of_a_file_opens_whole_and_styled(of_file: SeenProject) -> None:
     assert of_file.crs == CRS
     assert of_file.title == "Landmark map, version 2"
     assert of_file.errors == []
     assert {name: one["valid"] for name, one in of_file.layers.items()} == dict.fromkeys(
-        ("Anchors", "Landmarks", "Trajectories"), True
+        ("Anchors", "Landmarks", "Trajectories", "Image offsets"), True
     )
     assert of_file.layers["Landmarks"]["renderer"] == "QgsCategorizedSymbolRenderer"
+
+
+@in_qgis
+@pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:3857"])
+def test_ellipses_are_true_to_scale_in_a_file_of_another_crs(data: Path, tmp_path: Path, crs: str) -> None:
+    path, project = tmp_path / "map.gpkg", tmp_path / "map.qgz"
+    assert trigpoint("export", "gpkg", "--data", data, "--out", path, "--crs", crs).status == 0
+    assert projecting(project, "--gpkg", path).status == 0
+    opened = seen(project, tmp_path / "map.png", AROUND_M)
+    assert opened.crs == CRS
+    require_true_ellipse(opened)
 
 
 @in_qgis
@@ -99,16 +124,7 @@ def test_qgis_s_own_provider_reads_every_landmark_where_it_is(live: SeenProject)
 @pytest.mark.parametrize("name", ["of_file", "live"])
 def test_ellipses_are_drawn_true_to_scale(name: str, request: pytest.FixtureRequest) -> None:
     project: SeenProject = request.getfixturevalue(name)
-    row = newest()["L7"]
-    west, south, east, north = project.layers["Landmarks"]["drawn_m"]["L7"]
-    half_width_m = math.hypot(
-        row.sigma_major_m * math.cos(row.ellipse_heading_rad), row.sigma_minor_m * math.sin(row.ellipse_heading_rad)
-    )
-    half_height_m = math.hypot(
-        row.sigma_major_m * math.sin(row.ellipse_heading_rad), row.sigma_minor_m * math.cos(row.ellipse_heading_rad)
-    )
-    assert (east - west, north - south) == pytest.approx((2 * half_width_m, 2 * half_height_m), abs=ELLIPSE_M)
-    assert ((west + east) / 2, (south + north) / 2) == pytest.approx((row.easting_m, row.northing_m), abs=CENTIMETRE)
+    require_true_ellipse(project)
 
 
 @in_qgis
