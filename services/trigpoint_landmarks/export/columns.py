@@ -32,7 +32,15 @@ def columns_of(layer: Layer) -> tuple[Column, ...]:
 
 def cells_of(layer: Layer, properties: Mapping[str, object]) -> tuple[Cell, ...]:
     """A feature's cells from its GeoJSON properties."""
-    return tuple(cell for one in layer.properties for cell in _cells(one, properties[one.name]))
+    cells: list[Cell] = []
+    for one in layer.properties:
+        value = properties[one.name]
+        if one.kind == "array":
+            cells += _array_cells(one, value)
+        else:
+            assert value is None or isinstance(value, str | float | int)
+            cells.append(value)
+    return tuple(cells)
 
 
 def _columns(one: Property) -> tuple[Column, ...]:
@@ -48,15 +56,12 @@ def _columns(one: Property) -> tuple[Column, ...]:
     return (Column(one.name, one.kind, one.description),)
 
 
-def _cells(one: Property, value: object) -> tuple[Cell, ...]:
-    if one.name == COVARIANCE:
-        assert isinstance(value, list)
-        (variance_x_m2, covariance_xy_m2), (_, variance_y_m2) = value
-        return variance_x_m2, covariance_xy_m2, variance_y_m2
-    if one.kind == "array":
+def _array_cells(one: Property, value: object) -> tuple[Cell, ...]:
+    if one.name != COVARIANCE:
         return (json.dumps(value, ensure_ascii=False),)
-    assert value is None or isinstance(value, str | float | int)
-    return (value,)
+    assert isinstance(value, list)
+    (variance_x_m2, covariance_xy_m2), (_, variance_y_m2) = value
+    return variance_x_m2, covariance_xy_m2, variance_y_m2
 
 
 def described(columns: tuple[Column, ...]) -> list[JsonObject]:
