@@ -2,12 +2,14 @@
 
 import json
 import os
+import re
 from collections.abc import Mapping
+from http.client import HTTPException, HTTPMessage
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 from urllib.error import HTTPError, URLError
 from urllib.parse import quote, urlsplit
-from urllib.request import Request, urlopen
+from urllib.request import HTTPRedirectHandler, Request, build_opener
 
 import numpy as np
 
@@ -16,6 +18,7 @@ from trigpoint.geodesy.projection import WGS84, transform_coordinates
 from trigpoint.landmarks.feature_crs import CRS84, EPSG_URI
 from trigpoint.landmarks.geopackage_writing import read_handed_over
 from trigpoint.landmarks.layers import ANCHORS, LANDMARKS, LAYERS, TRAJECTORIES, Layer
+from trigpoint.observability.masking import without_password
 from trigpoint_landmarks.export.colours import KNOWN
 from trigpoint_landmarks.export.provenance import crs_name
 from trigpoint_landmarks.export.qgis_project import MERCATOR, Project, ProjectLayer
@@ -26,6 +29,9 @@ ANSWER_TIMEOUT_S = 10.0
 ZOOM_MOST = 22
 FEATURES_SCALE = 25_000  # farther away, tiles are drawn: no more than what is there is asked for feature by feature
 
+# No quotes, which a data source's text ends at, and no user: a password would stand in every project.
+ADDRESS = re.compile(r"https?://[A-Za-z0-9.\-\[\]:]+(/[A-Za-z0-9._~%/\-]*)?")
+
 Extent = tuple[float, float, float, float]
 
 
@@ -35,9 +41,7 @@ def project_of_service(url: str, *, token: str = "", authcfg: str = "") -> Proje
     `authcfg` is the id under which the QGIS that opens it keeps the service's token. Raises InputError for an address
     that is none and a service without a map, ServiceError where it does not answer as it should.
     """
-    address = url.rstrip("/")
-    if urlsplit(address).scheme not in ("http", "https") or not urlsplit(address).hostname or "'" in address:
-        raise InputError(f"server {url[:100]!r}: http://HOST or https://HOST is needed")
+    address = _address(url)
     collection = _asked(f"{address}/collections/{LANDMARKS.name}", token)
     version = _asked(f"{address}/versions", token).get("map_version")
     storage = str(collection.get("storageCrs", ""))
@@ -85,6 +89,15 @@ def project_of_geopackage(path: Path, *, beside: Path) -> Project:
     )
 
 
+def _address(url: str) -> str:
+    """The address of a service. Raises InputError for what is none, and for one with a password in it."""
+    if not ADDRESS.fullmatch(url):
+        raise InputError(
+            f"server {without_password(url)[:100]!r}: http://HOST or https://HOST, with port and path, is needed"
+        )
+    return url.rstrip("/")
+
+
 def _known(crs: str) -> str:
     """The name by which a GeoPackage knows a CRS."""
     return WGS84 if crs == crs_name(CRS84) else crs
@@ -116,15 +129,27 @@ def _tiles_of(layer: Layer, address: str, authcfg: str) -> ProjectLayer:
     )
 
 
+class _Staying(HTTPRedirectHandler):
+    """Follows nobody elsewhere: the token is for the service that was named."""
+
+    def redirect_request(
+        self, req: Request, fp: IO[bytes], code: int, msg: str, headers: HTTPMessage, newurl: str
+    ) -> None:
+        """No other request."""
+
+
+OPENER = build_opener(_Staying())
+
+
 def _asked(address: str, token: str) -> Mapping[str, Any]:
     headers = {"Authorization": f"Bearer {token}"} if token else {}
     try:
-        with urlopen(Request(address, headers=headers), timeout=ANSWER_TIMEOUT_S) as answer:
+        with OPENER.open(Request(address, headers=headers), timeout=ANSWER_TIMEOUT_S) as answer:
             content = answer.read(ANSWER_BYTES_MOST + 1)
             said = json.loads(content)
     except HTTPError as error:
         raise InputError(f"{address}: status {error.code}, {error.reason}") from error
-    except (URLError, TimeoutError, OSError) as error:
+    except (URLError, HTTPException, OSError) as error:
         raise ServiceError(f"{address}: no answer: {getattr(error, 'reason', error)}") from error
     except ValueError as error:
         raise InputError(f"{address}: the answer of {len(content)} bytes is no JSON of a map service") from error

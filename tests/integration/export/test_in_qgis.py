@@ -176,6 +176,8 @@ def test_the_project_of_a_file_names_it_from_its_own_folder(geopackage: Path, tm
         ((), 2, "either --server or --gpkg"),
         (("--gpkg", "none.gpkg"), 2, "no such file"),
         (("--server", "ftp://example.com"), 2, "http://HOST"),
+        (("--server", "http://a' b"), 2, "http://HOST"),
+        (("--server", "http://me:secret@127.0.0.1"), 2, "http://HOST"),
         (("--server", "http://127.0.0.1:9"), 1, "no answer"),
         (("--server", "http://127.0.0.1:9", "--authcfg", "a' b"), 2, "letters and digits"),
     ],
@@ -198,3 +200,19 @@ def test_another_service_is_not_taken_for_a_map(served: ServedMap, tmp_path: Pat
     run = projecting(tmp_path / "refused.qgz", "--server", served.health_url)
     assert run.status == 2
     assert json.dumps("status 404")[1:-1] in run.err
+
+
+def test_a_service_with_tokens_is_asked_by_one_that_no_project_holds(data: Path, tmp_path: Path) -> None:
+    tokens, own = tmp_path / "tokens.json", tmp_path / "token"
+    issued = trigpoint("tokens", "issue", "gis", "--scope", "read", "--file", tokens, "--json").answer
+    own.write_text(issued["token"] + "\n", encoding="ascii")
+    (tmp_path / "served").mkdir()
+    web = f"token_file = {json.dumps(str(tokens))}"
+    database = geopackage_line(data / "landmarks.gpkg")
+    with served_map(tmp_path / "served", database=database, web=web) as served:
+        refused = projecting(tmp_path / "map.qgs", "--server", served.url)
+        words = ("--server", served.url, "--token-file", own, "--authcfg", "gis0001")
+        assert projecting(tmp_path / "map.qgs", *words).status == 0
+    written = (tmp_path / "map.qgs").read_text(encoding="utf-8")
+    assert (refused.status, "status 401" in refused.err) == (2, True)
+    assert (issued["token"] in written, "authcfg=gis0001" in written) == (False, True)
