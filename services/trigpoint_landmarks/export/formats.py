@@ -57,13 +57,15 @@ def write_file(form: Format, path: Path, export: Export, *, force: bool) -> tupl
     Raises InputError for a file that is there, a folder that is not, and for what a format cannot hold; OSError where
     it cannot be written.
     """
-    if path.exists() and not force:
-        raise InputError(f"{path} is there already: --force replaces it")
+    beside = () if form.beside is None else tuple(form.beside(path, export))
+    files = (path, *(other for other, _ in beside))
+    there = [str(file) for file in files if file.exists()]
+    if there and not force:
+        raise InputError(f"{there[0]} is there already: --force replaces it")
     if not path.parent.is_dir():
         raise InputError(f"{path.parent}: no such folder")
     with replaced_durably(path) as partial:
         form.write(partial, export)
-    beside = () if form.beside is None else tuple(form.beside(path, export))
     for other, content in beside:
         replace_durably(other, content)
-    return (path, *(other for other, _ in beside))
+    return files

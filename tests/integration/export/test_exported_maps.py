@@ -189,6 +189,14 @@ def test_a_file_that_is_there_is_replaced_only_by_force(data: Path, tmp_path: Pa
     assert [file.name for file in tmp_path.iterdir() if file.name.endswith(".part")] == []
 
 
+def test_no_file_beside_a_csv_file_is_replaced_unasked(data: Path, tmp_path: Path) -> None:
+    (tmp_path / "map.prj").write_text("of a shapefile", encoding="utf-8")
+    refused = exporting(data, tmp_path / "map.csv", "csv")
+    assert refused.status == 2
+    assert "map.prj is there already" in refused.err
+    assert [file.name for file in tmp_path.iterdir()] == ["map.prj"]
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
