@@ -1,4 +1,4 @@
-"""The map over HTTP: how fast beside tipg on the same database, and whether GDAL reads every feature where it is."""
+"""The map over HTTP: how fast beside tipg on the same database; whether GDAL and QGIS read all of it where it is."""
 
 import subprocess
 import sys
@@ -12,9 +12,12 @@ from http_load.beside import Compared, compared
 from http_load.crowded_map import COUNT
 from http_load.reading import ReadBack, read_back
 from landmark_databases.cluster import binaries
+from qgis_reading.project import is_installed
+from qgis_reading.provider import ReadByQgis, read_by_qgis
 
 COMPARED = f"http_load.beside.compared()  # {COUNT} landmarks in PostGIS; trigpoint serve http and tipg in turn, by wrk"
 READ = "http_load.reading.read_back()  # trigpoint serve http, read by GDAL's OAPIF and MVT drivers"
+READ_BY_QGIS = "qgis_reading.provider.read_by_qgis()  # trigpoint serve http, read by QGIS's own OGC API provider"
 TESTS = Path(__file__).resolve().parent.parent / "integration" / "http" / "test_definition.py"
 FAILED_TESTS = 1  # pytest's exit status where tests failed, and nothing else did
 
@@ -34,6 +37,17 @@ def loads(folder: Path) -> Compared:
 def reading(folder: Path) -> ReadBack:
     """The map read back once."""
     return read_back(folder / "reading")
+
+
+@cache
+def qgis_reading(folder: Path) -> ReadByQgis:
+    """The map read by QGIS once."""
+    if not is_installed():
+        raise CommandFailed("python3-qgis is not installed")
+    try:
+        return read_by_qgis(folder / "qgis")
+    except (OSError, subprocess.SubprocessError, AssertionError) as error:
+        raise CommandFailed(f"{READ_BY_QGIS}: {error}") from error
 
 
 def of_loads(bench: Workbench, *, value: Callable[[Compared], float]) -> Measurement:
@@ -56,12 +70,21 @@ def violations(bench: Workbench) -> Measurement:
     return Measurement(value=float(failed), command=f"pytest -m slow tests/integration/http/{TESTS.name}")
 
 
+def of_qgis(bench: Workbench, *, value: Callable[[ReadByQgis], float]) -> Measurement:
+    """A number of what QGIS read."""
+    return Measurement(value=value(qgis_reading(bench.folder)), command=READ_BY_QGIS)
+
+
 def _load(name: str, unit: str, target: Bounds | None, value: Callable[[Compared], float]) -> Figure:
     return Figure(name=name, unit=unit, target=target, measure=partial(of_loads, value=value))
 
 
 def _read(name: str, unit: str, target: Bounds | None, value: Callable[[ReadBack], float]) -> Figure:
     return Figure(name=name, unit=unit, target=target, measure=partial(of_reading, value=value))
+
+
+def _by_qgis(name: str, unit: str, target: Bounds | None, value: Callable[[ReadByQgis], float]) -> Figure:
+    return Figure(name=name, unit=unit, target=target, measure=partial(of_qgis, value=value))
 
 
 TIPG_FIGURES = (
@@ -75,6 +98,8 @@ TIPG_FIGURES = (
 )
 FIGURES = (
     *TIPG_FIGURES,
+    _by_qgis("QGIS's own provider, landmarks not read", "1", at_most(0.0), lambda seen: seen.missing),
+    _by_qgis("QGIS's own provider, farthest from its place", "mm", at_most(10.0), lambda seen: 1e3 * seen.off_m),
     _read("GDAL's OAPIF driver, landmarks not read", "1", at_most(0.0), lambda seen: seen.missing),
     _read("GDAL's OAPIF driver, farthest from its place", "m", at_most(0.01), lambda seen: seen.off_m),
     _read("GDAL's MVT driver, landmarks not read", "1", at_most(0.0), lambda seen: seen.tile_missing),

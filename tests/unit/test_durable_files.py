@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from trigpoint.durable_files import replace_durably
+from trigpoint.durable_files import replace_durably, replaced_durably
 
 
 @pytest.fixture
@@ -42,6 +42,28 @@ def test_what_cannot_be_written_leaves_what_was_there(tmp_path: Path, monkeypatc
     with pytest.raises(OSError, match="no space"):
         replace_durably(tmp_path / "file", b"new")
     assert (tmp_path / "file").read_bytes() == b"old"
+
+
+def test_what_is_written_apart_takes_the_file_s_place_when_it_is_durable(tmp_path: Path, synced: list[str]) -> None:
+    (tmp_path / "file").write_bytes(b"old")
+    with replaced_durably(tmp_path / "file") as partial:
+        partial.write_bytes(b"new")
+        assert (tmp_path / "file").read_bytes() == b"old"
+    assert (tmp_path / "file").read_bytes() == b"new"
+    assert synced == [f"file.{os.getpid()}.part", tmp_path.name]
+
+
+def test_what_is_given_up_half_way_leaves_what_was_there_and_nothing_else(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"old")
+    with pytest.raises(OSError, match="no space"):
+        _give_up(tmp_path / "file")
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("file", b"old")]
+
+
+def _give_up(path: Path) -> None:
+    with replaced_durably(path) as partial:
+        partial.write_bytes(b"ne")
+        _fail(0)
 
 
 def _fail(descriptor: int) -> None:

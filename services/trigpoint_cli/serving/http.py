@@ -2,13 +2,11 @@
 
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, nullcontext
-from pathlib import Path
 
 from trigpoint.bus.zenoh_bus import ZenohBus
-from trigpoint.landmarks.feature_query import FeatureSource
-from trigpoint.landmarks.opening import geopackage_path
 from trigpoint.observability.metrics import Instruments
 from trigpoint.observability.running import Service
+from trigpoint_cli.feature_source import opened_source
 from trigpoint_cli.serving.map_corrections import LoggedCorrections
 from trigpoint_cli.serving.resources import data_of, database_url
 from trigpoint_cli.settings import Settings
@@ -22,23 +20,14 @@ def opened(settings: Settings, instruments: Instruments) -> Iterator[Service]:
     with heard as bus:
         service = HttpService(
             settings.web,
-            lambda: opened_source(settings),
+            lambda: opened_source(
+                database_url(settings),
+                password_file=settings.database.password_file,
+                connections=settings.web.connections,
+            ),
             corrections=LoggedCorrections(data_of(settings)),
             bus=bus,
             root=settings.fleet.root,
         )
         with closing(service):
             yield service
-
-
-def opened_source(settings: Settings) -> FeatureSource:
-    """The database of the configuration, to be asked for features. Raises InputError."""
-    url = database_url(settings)
-    path = geopackage_path(url)
-    if path is not None:
-        from trigpoint.landmarks.geopackage_features import GeoPackageFeatures
-
-        return GeoPackageFeatures(Path(path))
-    from trigpoint.landmarks.postgis_features import PostgisFeatures  # costs half a second a file does not need
-
-    return PostgisFeatures(url, password_file=settings.database.password_file, connections=settings.web.connections)

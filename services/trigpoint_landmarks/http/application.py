@@ -20,6 +20,7 @@ from trigpoint.landmarks.layers import LAYERS, Layer
 from trigpoint_landmarks.http import documents
 from trigpoint_landmarks.http.admission import Admission
 from trigpoint_landmarks.http.asked import Asked, asked_of
+from trigpoint_landmarks.http.compression import accepts_gzip
 from trigpoint_landmarks.http.documents import JSON, OPENAPI_JSON, QUADS, SCHEMA_JSON, JsonObject
 from trigpoint_landmarks.http.front import Front
 from trigpoint_landmarks.http.labelling import labelling_router
@@ -29,7 +30,7 @@ from trigpoint_landmarks.http.pages import Pages
 from trigpoint_landmarks.http.ports import MapCorrections
 from trigpoint_landmarks.http.problems import Problem, problem_of, problem_response
 from trigpoint_landmarks.http.settings import MEBIBYTE, WebSettings
-from trigpoint_landmarks.http.tiles import Tiles, asked_version, tile_of, tiled_layer
+from trigpoint_landmarks.http.tiles import Held, Tiles, asked_version, tile_of, tiled_layer
 
 Handler = Callable[[Request], Awaitable[Response]]
 
@@ -155,8 +156,11 @@ class MapApi:
             if not version.isascii() or not version.isdigit() or len(version) > 18 or as_of is not None:
                 raise Problem(HTTPStatus.NOT_FOUND, f"no map version {version[:40]!r}")
             as_of = int(version)
-        etag = request.headers.get("if-none-match", "")
-        return await self.tiles.tile(self.asked(request), layer, tile, as_of=as_of, etag=etag)
+        held = Held(
+            etag=request.headers.get("if-none-match", ""),
+            in_gzip=accepts_gzip(request.headers.get("accept-encoding", "")),
+        )
+        return await self.tiles.tile(self.asked(request), layer, tile, as_of=as_of, held=held)
 
     def routes(self) -> dict[str, Handler]:
         """Every path that is read, and its handler."""

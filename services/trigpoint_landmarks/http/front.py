@@ -10,6 +10,7 @@ from starlette.responses import Response
 from trigpoint.landmarks.layers import Layer
 from trigpoint_landmarks.http.admission import Admission, Message, Receive, announced_size, require_size, whole_body
 from trigpoint_landmarks.http.asked import Asked, host_of
+from trigpoint_landmarks.http.compression import negotiated
 from trigpoint_landmarks.http.pages import Pages
 from trigpoint_landmarks.http.problems import Problem, problem_of, problem_response
 from trigpoint_landmarks.http.settings import WebSettings, is_loopback
@@ -93,7 +94,8 @@ class Front:
         match scope["path"].split("/"):
             case ["", "collections", name, "items"]:
                 request = Request(scope, receive)
-                return await self._api.pages.items(self._api.asked(request), self._api.layer(name))
+                page = await self._api.pages.items(self._api.asked(request), self._api.layer(name))
+                return await negotiated(page, request.headers.get("accept-encoding", ""))
             case ["", "tiles", name, zoom, column, row]:
                 return await self._api.tile(Request(scope, receive), name, (zoom, column, row))
             case _:

@@ -12,6 +12,7 @@ from trigpoint.landmarks.feature_crs import CRS84, FeatureCrs
 from trigpoint.landmarks.feature_query import FeaturePage, FeatureQuery, FeatureSource, MapState
 from trigpoint.landmarks.layers import Layer
 from trigpoint_landmarks.http.asked import Asked
+from trigpoint_landmarks.http.compression import VARY
 from trigpoint_landmarks.http.documents import GEOJSON, JSON, JsonObject, link
 from trigpoint_landmarks.http.drive_pages import drive_page
 from trigpoint_landmarks.http.map_watch import MapWatch
@@ -92,5 +93,5 @@ def _page_links(asked: Asked, layer: Layer, page: FeaturePage) -> list[JsonObjec
 
 
 def _geojson(content: bytes, crs: FeatureCrs) -> Response:
-    headers = {"Content-Crs": f"<{crs.uri}>", "Cache-Control": "no-cache"}
+    headers = {"Content-Crs": f"<{crs.uri}>", "Cache-Control": "no-cache", "Vary": VARY}
     return Response(content, HTTPStatus.OK, headers, GEOJSON)

@@ -2,6 +2,7 @@
 
 import asyncio
 import re
+from dataclasses import dataclass
 from http import HTTPStatus
 
 from starlette.responses import Response
@@ -12,6 +13,7 @@ from trigpoint.landmarks.feature_query import FeatureSource, MapState
 from trigpoint.landmarks.layers import LAYERS, Layer
 from trigpoint.landmarks.tile_grid import require_tile
 from trigpoint_landmarks.http.asked import Asked
+from trigpoint_landmarks.http.compression import GZIP, TILE_LEVEL, VARY, compressed
 from trigpoint_landmarks.http.documents import MVT
 from trigpoint_landmarks.http.map_watch import MapWatch
 from trigpoint_landmarks.http.problems import Problem
@@ -21,9 +23,18 @@ DRAWING = 1  # of this kind: another way to draw tiles gets another number, and 
 YEAR_S = 31_536_000
 FRESH_S = 1  # how long a tile of whatever version is newest may be shown unasked
 WHOLE = re.compile(r"0|[1-9][0-9]{0,9}")
+IN_GZIP = "-gzip"  # at the end of an ETag: a strong one names bytes, which differ by encoding
 NAMES = ("as_of", "version", "f")
 
 TileKey = tuple[str, WebTile, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Held:
+    """What a client holds, by its If-None-Match, and whether it takes tiles in gzip."""
+
+    etag: str = ""
+    in_gzip: bool = False
 
 
 class Tiles:
@@ -35,22 +46,35 @@ class Tiles:
         self._drawing: dict[TileKey, asyncio.Task[bytes]] = {}
         self._audience = "public" if public else "private"
 
-    async def tile(self, asked: Asked, layer: Layer, tile: WebTile, *, as_of: int | None, etag: str) -> Response:
-        """A tile; `etag`: what a client holds, by its If-None-Match. Raises Problem, DatabaseUnavailable."""
+    async def tile(self, asked: Asked, layer: Layer, tile: WebTile, *, as_of: int | None, held: Held) -> Response:
+        """A tile, named anew by its ETag in each encoding. Raises Problem, DatabaseUnavailable."""
         state = await self._watch.current()
         if state is None:
             return Response(None, HTTPStatus.NO_CONTENT, {"Cache-Control": "no-cache"})
         state = await self._watch.version(as_of, state)
         version = state.newest if as_of is None else as_of
-        own = f'"{DRAWING}-{layer.name}-{tile.zoom}-{tile.column}-{tile.row}-{version}"'
+        own = (
+            f'"{DRAWING}-{layer.name}-{tile.zoom}-{tile.column}-{tile.row}-{version}{IN_GZIP if held.in_gzip else ""}"'
+        )
         kept = f"max-age={YEAR_S}, immutable" if as_of is not None else f"max-age={FRESH_S}, must-revalidate"
-        headers = {"ETag": own, "Cache-Control": f"{self._audience}, {kept}"}
-        if etag and _matches(etag, own):
+        headers = {"ETag": own, "Cache-Control": f"{self._audience}, {kept}", "Vary": VARY}
+        if held.etag and _matches(held.etag, own):
             return Response(None, HTTPStatus.NOT_MODIFIED, headers)
         content = await self._content((layer.name, tile, version), layer, state)
         if not content:
             return Response(None, HTTPStatus.NO_CONTENT, headers)
+        if held.in_gzip:
+            content = await self._in_gzip((layer.name, tile, version), content)
+            headers["Content-Encoding"] = GZIP
         return Response(content, HTTPStatus.OK, headers, MVT)
+
+    async def _in_gzip(self, key: TileKey, content: bytes) -> bytes:
+        """A tile's content compressed, kept beside it."""
+        held = self._cache.get((*key, GZIP))
+        if held is None:
+            held = await compressed(content, TILE_LEVEL)
+            self._cache.put((*key, GZIP), held)
+        return held
 
     async def _content(self, key: TileKey, layer: Layer, state: MapState) -> bytes:
         held = self._cache.get(key)

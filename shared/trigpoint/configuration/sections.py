@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 from urllib.parse import urlsplit
 
 from pydantic import Field
@@ -142,7 +142,7 @@ class UpSettings:
     `stop_limit_s` a process.
     """
 
-    services: tuple[ServiceName, ...] = ("router", "ingest", "filtering", "optimisation", "landmarks")
+    services: tuple[ServiceName, ...] = get_args(ServiceName)
     backoff_first_s: Seconds = 0.5
     backoff_ceiling_s: Seconds = 30.0
     steady_s: Seconds = 60.0

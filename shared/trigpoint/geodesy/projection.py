@@ -4,6 +4,7 @@ import math
 import warnings
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from trigpoint.geodesy.positions import GridPosition, MapPosition, Wgs84Position
 Floats = NDArray[np.float64]
 
 WGS84 = "EPSG:4326"
+WGS84_NAME = "World Geodetic System 1984"  # its ensemble counts as dynamic (IOGP 373-7-1): its realisations are
 ORIGIN_ROUNDING_M = 1000.0  # a map's origin is a round grid position: a person can read it
 
 
@@ -194,6 +196,35 @@ def crs_definition(crs: str) -> CrsDefinition:
         raise FrameRefused(f"CRS {crs!r} has no WKT 1: {error}") from error
     authority, code = parsed.to_authority() or ("", "0")
     return CrsDefinition(parsed.name, authority, int(code) if code.isdecimal() else 0, wkt)
+
+
+def crs_unit(crs: str) -> Literal["deg", "m"]:
+    """The unit of a CRS's horizontal axes. Raises FrameRefused for one that is unknown, or in any other unit."""
+    parsed = _parsed_crs(crs)
+    units = {axis.unit_name for axis in parsed.axis_info[:2]}
+    if parsed.is_geographic and units == {"degree"}:
+        return "deg"
+    if parsed.is_projected and units == {"metre"}:
+        return "m"
+    raise FrameRefused(f"CRS {crs!r} is {parsed.type_name} in {'/'.join(sorted(units))}: degrees or metres are needed")
+
+
+def needs_epoch(crs: str) -> bool:
+    """Whether the ground moves in a CRS, so that a position says little without its epoch (ISO 19111: dynamic)."""
+    geodetic = _parsed_crs(crs).geodetic_crs
+    described: dict[str, Any] = {} if geodetic is None else geodetic.to_json_dict()
+    datum = described.get("datum") or described.get("datum_ensemble") or {}
+    return datum.get("type") == "DynamicGeodeticReferenceFrame" or WGS84_NAME in datum.get("name", "")
+
+
+def crs_projjson(crs: str) -> dict[str, Any]:
+    """The definition of a CRS as PROJJSON. Raises FrameRefused if it is not known."""
+    return _parsed_crs(crs).to_json_dict()
+
+
+def crs_wkt2(crs: str) -> str:
+    """The definition of a CRS as WKT 2 (ISO 19162:2019). Raises FrameRefused if it is not known."""
+    return str(_parsed_crs(crs).to_wkt("WKT2_2019"))
 
 
 def geodesic_distances_m(from_lat_deg: float, from_lon_deg: float, *, lat_deg: Floats, lon_deg: Floats) -> Floats:

@@ -98,8 +98,12 @@ def rtree_name(table: str) -> str:
     return f"rtree_{table}_geom"
 
 
-def rtree_statements(table: str) -> Iterator[str]:
-    """The spatial index of a layer and the triggers that keep it true, whoever edits the layer."""
+def rtree_statements(table: str, *, user_version: int = USER_VERSION) -> Iterator[str]:
+    """The spatial index of a layer and the triggers that keep it true, whoever edits the layer.
+
+    Their names, and what they are for, are those of the file's version of GeoPackage: 1.4 tells rows whose place was
+    empty before from others, so that an upsert does not fire a trigger twice.
+    """
     index = rtree_name(table)
     box = "ST_MinX(NEW.geom), ST_MaxX(NEW.geom), ST_MinY(NEW.geom), ST_MaxY(NEW.geom)"
     new_is_there = "(NEW.geom NOTNULL AND NOT ST_IsEmpty(NEW.geom))"
@@ -109,12 +113,19 @@ def rtree_statements(table: str) -> Iterator[str]:
     put, drop = f"INSERT OR REPLACE INTO {index} VALUES (NEW.fid, {box});", f"DELETE FROM {index} WHERE id = OLD.fid;"
     both = f"DELETE FROM {index} WHERE id IN (OLD.fid, NEW.fid);"
     yield f"CREATE VIRTUAL TABLE {index} USING rtree(id, minx, maxx, miny, maxy)"
+    if user_version >= USER_VERSION:
+        moved: tuple[tuple[str, str, str, str], ...] = (
+            ("update6", "UPDATE OF geom", f"OLD.fid = NEW.fid AND {new_is_there} AND {old_is_there}", put),
+            ("update7", "UPDATE OF geom", f"OLD.fid = NEW.fid AND {new_is_there} AND {old_is_empty}", put),
+        )
+    else:
+        moved = (("update1", "UPDATE OF geom", f"OLD.fid = NEW.fid AND {new_is_there}", put),)
+    renumbered = "update5" if user_version >= USER_VERSION else "update3"
     for suffix, event, condition, action in (
         ("insert", "INSERT", new_is_there, put),
-        ("update6", "UPDATE OF geom", f"OLD.fid = NEW.fid AND {new_is_there} AND {old_is_there}", put),
-        ("update7", "UPDATE OF geom", f"OLD.fid = NEW.fid AND {new_is_there} AND {old_is_empty}", put),
+        *moved,
         ("update2", "UPDATE OF geom", f"OLD.fid = NEW.fid AND {new_is_empty}", drop),
-        ("update5", "UPDATE", f"OLD.fid != NEW.fid AND {new_is_there}", f"{drop} {put}"),
+        (renumbered, "UPDATE", f"OLD.fid != NEW.fid AND {new_is_there}", f"{drop} {put}"),
         ("update4", "UPDATE", f"OLD.fid != NEW.fid AND {new_is_empty}", both),
         ("delete", "DELETE", "OLD.geom NOTNULL", drop),
     ):

@@ -4,11 +4,13 @@ import json
 import os
 import signal
 import socket
+import urllib.request
 from pathlib import Path
 
 import pytest
 
-from command_runs.processes import Fleet, Process, fleet_in, runs, trigpoint_process, wait_until
+from command_runs.processes import Fleet, Process, fleet_in, free_ports, runs, trigpoint_process, wait_until
+from trigpoint_cli.serve import SERVICES
 
 TWO = '[up]\nservices = ["router", "ingest"]\nbackoff_first_s = 0.05\nstop_limit_s = 1.0\nfailing_count = 3\n'
 
@@ -71,6 +73,17 @@ def test_services_start_in_their_order_and_stop_in_reverse(fleet: Fleet) -> None
         assert messages(up, "stopped") == ["ingest", "router"]
         assert json.loads(up.out)["killed"] == []
     assert [name for name, pid in running.items() if runs(pid)] == []
+
+
+def test_without_being_told_which_all_services_run_and_the_map_is_served_on_loopback(tmp_path: Path) -> None:
+    (port,) = free_ports(1)
+    fleet = fleet_in(tmp_path, f"[web]\nport = {port}\n")
+    with trigpoint_process(fleet.folder, "up", "--config", fleet.config) as up:
+        fleet.wait_ready("up")
+        assert set(pids(fleet)) == {*SERVICES, "router"}
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/versions", timeout=10.0) as answer:
+            assert json.load(answer)["versions"] == []
+        assert up.stop() == 0
 
 
 def test_a_service_that_was_killed_is_started_again_and_counted(fleet: Fleet) -> None:

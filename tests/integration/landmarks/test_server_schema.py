@@ -9,6 +9,7 @@ from landmark_databases.cluster import Cluster
 from landmark_maps.examples import change, checkpoint, landmark, version_row
 from trigpoint.errors import DatabaseUnavailable, InputError
 from trigpoint.landmarks import tables
+from trigpoint.landmarks.geopackage_query import Validity
 from trigpoint.landmarks.postgis_query import landmark_statement
 from trigpoint.landmarks.postgis_store import PostgisStore
 from trigpoint.landmarks.queries import Disc, LandmarkQuery, box_around
@@ -75,13 +76,13 @@ def test_opened_again_nothing_changes(made: str) -> None:
 
 def test_a_newer_schema_is_refused_with_both_versions(made: str) -> None:
     executed(made, "UPDATE alembic_version SET version_num = '9999'")
-    with pytest.raises(InputError, match="schema 9999 is newer than 0001"):
+    with pytest.raises(InputError, match="schema 9999 is newer than 0002"):
         PostgisStore(made)
 
 
 def test_a_newer_schema_is_refused_for_reading_too(made: str) -> None:
     executed(made, "UPDATE alembic_version SET version_num = '9999'")
-    with pytest.raises(InputError, match="schema 9999 is newer than 0001"):
+    with pytest.raises(InputError, match="schema 9999 is newer than 0002"):
         PostgisStore(made, read_only=True)
 
 
@@ -125,6 +126,29 @@ def test_indexes_put_off_are_made_when_they_are_wanted(made: str) -> None:
     store.restore_indexes()
     assert scalars(made, spatial) == before
     store.close()
+
+
+@pytest.mark.parametrize(
+    ("table", "validity", "index"),
+    [
+        ("landmarks", Validity(valid_at=9, opened_after=8), "landmarks_opened"),
+        ("landmark_history", Validity(valid_at=9, opened_after=8), "landmark_history_opened"),
+        ("landmark_history", Validity(valid_at=8, ended_by=9), "landmark_history_ended"),
+    ],
+)
+def test_what_changed_since_a_version_is_looked_up_by_index(
+    made: str, table: str, validity: Validity, index: str
+) -> None:
+    statement = landmark_statement(
+        tables.metadata.tables[table], LandmarkQuery(), version=version_row(), validity=validity
+    )
+    engine = create_engine(made)
+    asked = statement.compile(engine, compile_kwargs={"literal_binds": True})
+    with engine.connect() as connection:
+        connection.execute(text("SET enable_seqscan = off"))
+        plan = list(connection.scalars(text(f"EXPLAIN {asked}")))
+    engine.dispose()
+    assert any(index in line for line in plan)
 
 
 def test_a_reader_in_the_way_leaves_the_indexes_as_they_are(made: str) -> None:

@@ -1,0 +1,1 @@
+"""Exported maps, and what other programs read out of them."""
