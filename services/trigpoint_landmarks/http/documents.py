@@ -69,6 +69,7 @@ def landing_page(asked: Asked) -> JsonObject:
         "links": [
             link(asked.url("/"), "self", JSON, "This page"),
             link(asked.url("/", f="html"), "alternate", "text/html", "This page for people"),
+            link(asked.url("/viewer/"), "preview", "text/html", "The map, to look at and to label anchors in"),
             link(asked.url("/api"), "service-desc", OPENAPI_JSON, "The API's definition"),
             link(asked.url("/conformance"), "conformance", JSON, "What it conforms to"),
             link(asked.url("/collections"), "data", JSON, "The collections"),

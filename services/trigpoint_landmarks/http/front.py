@@ -14,6 +14,7 @@ from trigpoint_landmarks.http.pages import Pages
 from trigpoint_landmarks.http.problems import Problem, problem_of, problem_response
 from trigpoint_landmarks.http.settings import WebSettings, is_loopback
 from trigpoint_landmarks.http.tokens import Scope
+from trigpoint_landmarks.http.viewer_files import PREFIX, viewer_files
 
 READING = frozenset({"GET", "HEAD"})
 EVERYWHERE = ((b"x-content-type-options", b"nosniff"), (b"referrer-policy", b"no-referrer"))
@@ -46,6 +47,7 @@ class Front:
     def __init__(self, behind: Any, api: Reading, admission: Admission, settings: WebSettings) -> None:
         self._behind, self._api, self._admission, self._settings = behind, api, admission, settings
         self._local_only = settings.token_file is None and not settings.open_reading
+        self._viewer = viewer_files()
         self._under_way = 0
 
     async def __call__(self, scope: Message, receive: Receive, send: Any) -> None:
@@ -77,6 +79,9 @@ class Front:
         caller = self._admission.caller(scope)
         if self._local_only and not _called_locally(scope):
             raise Problem(HTTPStatus.MISDIRECTED_REQUEST, "only this machine's own names are served here")
+        if scope["method"] in READING and _is_of_viewer(scope):  # its files hold nothing of the map
+            await self._viewer.answer(scope["path"].removeprefix(PREFIX))(scope, receive, send)
+            return
         caller.require(_needed(scope))
         scope.setdefault("state", {})["caller"] = caller
         if scope["method"] in READING:
@@ -117,6 +122,12 @@ def _needed(scope: Message) -> Scope:
     if scope["method"] in READING or scope["method"] == "OPTIONS":
         return Scope.READ
     return Scope.ADMINISTER if scope["path"].startswith("/drives") else Scope.LABEL
+
+
+def _is_of_viewer(scope: Message) -> bool:
+    """Whether a path is one of the viewer's."""
+    path: str = scope["path"]
+    return path == PREFIX or path.startswith(f"{PREFIX}/")
 
 
 def _called_locally(scope: Message) -> bool:

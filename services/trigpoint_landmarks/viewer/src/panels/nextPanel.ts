@@ -1,0 +1,83 @@
+/** Where one more anchor would help most: a list that can be stepped through, and the same on the map. */
+import { button, el, fill } from "../dom.ts";
+import type { MapView } from "../map/mapView.ts";
+import type { Speech } from "../speech.ts";
+import type { Store } from "../state.ts";
+import { metres, percent, squareMetres } from "../text.ts";
+import type { Suggestion, Suggestions } from "../wire.ts";
+
+export class NextPanel {
+  readonly element: HTMLElement;
+  private readonly list = el("ol", { class: "ranked" });
+  private readonly about = el("p", { class: "muted" });
+  private readonly stepper: HTMLElement;
+  private at = -1;
+
+  constructor(
+    private readonly store: Store,
+    private readonly view: MapView,
+    private readonly speech: Speech,
+    private readonly labelHere: (suggestion: Suggestion) => void,
+  ) {
+    this.stepper = el(
+      "div",
+      { class: "actions" },
+      button("Previous", () => this.step(-1)),
+      button("Next", () => this.step(1), { class: "primary" }),
+    );
+    this.element = el("div", {}, el("h2", {}, "Where to label next"), this.about, this.stepper, this.list);
+    store.on(["suggestions"], ({ suggestions }) => {
+      this.at = -1;
+      this.render(suggestions);
+    });
+  }
+
+  private render(found: Suggestions | null): void {
+    const rows = found?.suggestions ?? [];
+    this.stepper.hidden = !rows.length;
+    this.about.textContent = found
+      ? rows.length
+        ? `Best first. ${found.method}`
+        : "No single anchor would make this map more certain."
+      : "This service does not say where an anchor would help.";
+    fill(this.list, ...rows.map((one, index) => this.row(one, index)));
+  }
+
+  private row(one: Suggestion, index: number): HTMLElement {
+    const chosen = index === this.at;
+    const bar = el("span", { class: "bar", "aria-hidden": "true" });
+    bar.style.setProperty("--share", String(one.share));
+    const gain = `takes off ${squareMetres(one.variance_reduction_m2)}, ${percent(one.share)} of the map's variance`;
+    const head = button("", () => this.choose(index), { class: "row", "aria-current": chosen ? "true" : null });
+    fill(
+      head,
+      el("b", {}, String(one.rank)),
+      el(
+        "span",
+        {},
+        `${one.kind} ${one.landmark}`,
+        el("small", {}, `${gain}; 1-sigma now ${metres(one.sigma_major_m)}`),
+      ),
+      bar,
+    );
+    return el("li", {}, head, chosen ? button("Label an anchor here", () => this.labelHere(one)) : null);
+  }
+
+  private step(by: number): void {
+    const count = this.store.state.suggestions?.suggestions.length ?? 0;
+    if (count) this.choose((Math.max(this.at, by > 0 ? -1 : 0) + by + count) % count);
+  }
+
+  private choose(index: number): void {
+    const { suggestions } = this.store.state;
+    const one = suggestions?.suggestions[index];
+    if (!suggestions || !one) return;
+    this.at = index;
+    const focused = this.list.contains(document.activeElement);
+    this.render(suggestions);
+    if (focused) this.list.querySelectorAll<HTMLButtonElement>("button.row")[index]?.focus();
+    this.view.goTo(one.position);
+    this.store.set({ selection: null, selectedAt: one.position });
+    this.speech.say(`${one.rank}: ${one.kind} ${one.landmark}, ${percent(one.share)} of the map's variance`);
+  }
+}
