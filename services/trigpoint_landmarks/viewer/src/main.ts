@@ -3,6 +3,7 @@ import "./theme.css";
 import { MapApi, Refused, said } from "./api.ts";
 import { el, fill } from "./dom.ts";
 import { Follower } from "./live/follower.ts";
+import { MapView } from "./map/mapView.ts";
 import { statusBar } from "./panels/statusBar.ts";
 import { tokenForm } from "./panels/tokenForm.ts";
 import { Speech } from "./speech.ts";
@@ -18,6 +19,7 @@ const token = tokenForm(store, () => void begin());
 const title = el("h1", {}, "trigpoint", el("small", {}, "viewer"));
 const root = document.getElementById("viewer") ?? document.body;
 const places = frame(root, [title, statusBar(store, speech), speech.element]);
+const view = new MapView(places.canvas, api);
 let viewer: Viewer | null = null;
 let beginning = false;
 
@@ -48,8 +50,13 @@ async function open(): Promise<void> {
   }
   store.set({ versions, shown: version, crs: landmarks.storageCrs, trouble: "" });
   const box = landmarks.extent.spatial?.bbox[0] ?? WORLD;
-  viewer = new Viewer(api, store, speech, places, { box, version, token });
-  await viewer.refresh();
+  const drawn = view.open(box, version);
+  viewer = new Viewer(api, store, view, speech, places, token);
+  const refreshed = viewer.refresh();
+  await drawn;
+  performance.mark("first-picture");
+  places.canvas.dataset.drawn = "true";
+  await refreshed;
   await viewer.offerRasters();
 }
 

@@ -2,7 +2,7 @@
 import type { MapApi } from "./api.ts";
 import { el, fill } from "./dom.ts";
 import { Labelling } from "./labelling/labelling.ts";
-import { MapView, type Pointed } from "./map/mapView.ts";
+import type { MapView, Pointed } from "./map/mapView.ts";
 import { MapData } from "./mapData.ts";
 import { DetailsCard } from "./panels/detailsCard.ts";
 import { LabelPanel } from "./panels/labelPanel.ts";
@@ -13,7 +13,7 @@ import { Tabs } from "./panels/tabs.ts";
 import { VersionBar } from "./panels/versionBar.ts";
 import type { Speech } from "./speech.ts";
 import type { Selection, Store } from "./state.ts";
-import type { Box, LonLat, Suggestion } from "./wire.ts";
+import type { LonLat, Suggestion } from "./wire.ts";
 
 /** The places on the page the parts go to. */
 export interface Places {
@@ -31,7 +31,6 @@ const SELECTED_BY: Partial<Record<Pointed["layer"], Selection["what"]>> = {
 };
 
 export class Viewer {
-  private readonly view: MapView;
   private readonly data: MapData;
   private readonly labelling: Labelling;
   private readonly layers: LayersPanel;
@@ -40,16 +39,11 @@ export class Viewer {
   constructor(
     private readonly api: MapApi,
     private readonly store: Store,
+    private readonly view: MapView,
     speech: Speech,
     places: Places,
-    start: { box: Box; version: number; token: HTMLElement },
+    token: HTMLElement,
   ) {
-    const { box, version, token } = start;
-    this.view = new MapView(places.canvas, api, box, version);
-    this.view.whenDrawn(() => {
-      performance.mark("first-picture");
-      places.canvas.dataset["drawn"] = "true";
-    });
     this.data = new MapData(api, this.view, store);
     this.labelling = new Labelling(api, this.view, store, speech);
     this.layers = new LayersPanel(store, (group, shown) => this.showGroup(group, shown));

@@ -2,7 +2,7 @@
 import { type MapApi, said } from "../api.ts";
 import type { Told } from "../wire.ts";
 import { EventText } from "./eventStream.ts";
-import { after, type Happened, type Link, UNLINKED } from "./link.ts";
+import { type Happened, type Link, linkAfter, UNLINKED } from "./link.ts";
 
 const SILENCE_MS = 12_000; // the service says that it is there at least every 5 s
 const ASK_AGAIN_MS = 2_000;
@@ -28,7 +28,7 @@ export class Follower {
   }
 
   private happen(happened: Happened): void {
-    this.link = after(this.link, happened);
+    this.link = linkAfter(this.link, happened);
     this.changed(this.link);
   }
 

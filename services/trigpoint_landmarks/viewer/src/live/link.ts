@@ -39,7 +39,7 @@ export const UNLINKED: Link = {
 };
 
 /** The link after something happened. */
-export function after(link: Link, happened: Happened): Link {
+export function linkAfter(link: Link, happened: Happened): Link {
   const way = happened.kind === "lost" ? "offline" : happened.way;
   const sinceMs = way === link.way ? link.sinceMs : happened.atMs;
   if (happened.kind === "lost") return { ...link, way, sinceMs, why: happened.why };

@@ -5,6 +5,7 @@ import {
   Map as MapLibre,
   type MapMouseEvent,
   NavigationControl,
+  prewarm,
   ScaleControl,
   setWorkerUrl,
   type VectorTileSource,
@@ -17,10 +18,19 @@ import type { Drawn, UncertainPoint } from "./features.ts";
 import { drawIcons } from "./icons.ts";
 import { LAYER_GROUPS } from "./layerGroups.ts";
 import { palette } from "./palette.ts";
-import { dataLayers, type FeatureSource, rasterSource, styleOf, TILE_SOURCES } from "./style.ts";
+import {
+  dataLayers,
+  type FeatureSource,
+  groundStyle,
+  rasterSource,
+  shownLayers,
+  sources,
+  TILE_SOURCES,
+} from "./style.ts";
 
 const REACH_PX = 8; // from what is pointed at
 const CLOSE_ZOOM = 20;
+const AROUND_PX = { top: 32, left: 32, right: 56, bottom: 120 }; // the controls' room
 const POINTED = ["anchors", "suggestions", "landmarks", "fixes", "footprints-fill"] as const;
 
 /** Something on the map, by its layer and id. */
@@ -30,23 +40,23 @@ export interface Pointed {
 }
 
 setWorkerUrl(workerUrl);
+prewarm();
 
 export class MapView {
   readonly map: MapLibre;
   private readonly raised = new Map<FeatureSource, Drawn>();
-  private ready = false;
+  private readonly styled: Promise<unknown>;
+  private version = 0;
+  private opened = false;
 
+  /** A map without anything on it: the browser prepares to draw while the service is asked. */
   constructor(
     container: HTMLElement,
     private readonly api: MapApi,
-    box: Box,
-    private version: number,
   ) {
     this.map = new MapLibre({
       container,
-      style: styleOf(palette(), (layer) => api.tiles(layer, version)),
-      bounds: box,
-      fitBoundsOptions: { padding: 48, maxZoom: CLOSE_ZOOM },
+      style: groundStyle(palette()),
       maxZoom: 24,
       attributionControl: false,
       dragRotate: false,
@@ -60,13 +70,21 @@ export class MapView {
     this.map.keyboard.disableRotation();
     this.map.addControl(new NavigationControl({ showCompass: false }), "top-right");
     this.map.addControl(new ScaleControl({ maxWidth: 120 }), "bottom-left");
-    this.map.once("style.load", () => this.begin());
+    this.styled = this.map.once("style.load");
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.recolour());
   }
 
-  /** Called once, when the first picture is drawn. */
-  whenDrawn(call: () => void): void {
-    this.map.once("idle", call);
+  /** Shows a version in a box; done when it is drawn: landmarks and paths, then all that `draw` was given. */
+  async open(box: Box, version: number): Promise<void> {
+    await this.styled;
+    this.version = version;
+    this.map.fitBounds(box, { padding: AROUND_PX, maxZoom: CLOSE_ZOOM, animate: false });
+    for (const [id, source] of sources((layer) => this.api.tiles(layer, version))) this.map.addSource(id, source);
+    drawIcons(this.map, palette());
+    for (const layer of shownLayers(palette())) this.map.addLayer(layer);
+    await this.map.once("idle");
+    this.opened = true;
+    for (const [source, features] of this.raised) this.draw(source, features);
   }
 
   /** Called when the view has come to rest, or other landmarks are there. */
@@ -83,7 +101,7 @@ export class MapView {
 
   draw(source: FeatureSource, features: Drawn): void {
     this.raised.set(source, features);
-    if (this.ready) this.map.getSource<GeoJSONSource>(source)?.setData(features);
+    if (this.opened) this.map.getSource<GeoJSONSource>(source)?.setData(features);
   }
 
   show(group: string, shown: boolean): void {
@@ -141,16 +159,11 @@ export class MapView {
     this.map.easeTo({ center: position, zoom: close ? Math.max(this.map.getZoom(), CLOSE_ZOOM) : this.map.getZoom() });
   }
 
-  private begin(): void {
-    this.ready = true;
-    drawIcons(this.map, palette());
-    for (const [source, features] of this.raised) this.draw(source, features);
-  }
-
   private recolour(): void {
     const colours = palette();
-    drawIcons(this.map, colours);
     this.map.setPaintProperty("ground", "background-color", colours.ground);
+    if (!this.opened) return;
+    drawIcons(this.map, colours);
     for (const { id, paint } of dataLayers(colours)) {
       for (const [name, value] of Object.entries(paint ?? {})) {
         this.map.setPaintProperty(id, name as "line-color", value as string);

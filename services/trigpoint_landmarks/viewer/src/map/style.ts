@@ -26,6 +26,8 @@ const FONT = ["sans-serif"];
 
 const WIDER = ["interpolate", ["linear"], ["zoom"], 14, 1.4, 20, 3];
 
+const PLAIN = { "fill-antialias": false }; // a line goes around each fill
+
 type Paint = Record<string, unknown>;
 
 function layer(type: string, id: string, source: string, paint: Paint, more: Record<string, unknown> = {}) {
@@ -52,7 +54,7 @@ function pathLayers(colours: Palette): LayerSpecification[] {
 function footprintLayers(colours: Palette): LayerSpecification[] {
   const text = { "text-field": ["get", "title"], "text-font": FONT, "text-size": 12 };
   return [
-    layer("fill", "footprints-fill", "footprints", { "fill-color": colours.footprint, "fill-opacity": 0.06 }),
+    layer("fill", "footprints-fill", "footprints", { ...PLAIN, "fill-color": colours.footprint, "fill-opacity": 0.06 }),
     line("footprints-line", "footprints", colours.footprint, { "line-width": 1.5, "line-dasharray": [4, 2] }),
     line("offsets", "offsets", colours.footprint, { "line-width": 2.5 }),
     layer(
@@ -73,7 +75,7 @@ function landmarkLayers(colours: Palette): LayerSpecification[] {
     "circle-stroke-width": ["case", ["==", ["get", "anchored"], true], 2, 1],
   };
   return [
-    layer("fill", "ellipses-fill", "ellipses", { "fill-color": ofKind(colours), "fill-opacity": 0.16 }),
+    layer("fill", "ellipses-fill", "ellipses", { ...PLAIN, "fill-color": ofKind(colours), "fill-opacity": 0.16 }),
     layer("line", "ellipses-line", "ellipses", {
       "line-color": ofKind(colours),
       "line-width": 1.2,
@@ -123,7 +125,13 @@ function suggestionLayers(colours: Palette): LayerSpecification[] {
 function pointedAtLayers(colours: Palette): LayerSpecification[] {
   const part = (name: string) => ({ filter: ["==", ["get", "part"], name] });
   return [
-    layer("fill", "prospect-gate", "prospect", { "fill-color": colours.anchor, "fill-opacity": 0.08 }, part("gate")),
+    layer(
+      "fill",
+      "prospect-gate",
+      "prospect",
+      { ...PLAIN, "fill-color": colours.anchor, "fill-opacity": 0.08 },
+      part("gate"),
+    ),
     line(
       "prospect-gate-line",
       "prospect",
@@ -160,22 +168,32 @@ function hidden(one: LayerSpecification): LayerSpecification {
   return { ...one, layout: { ...one.layout, visibility: "none" } } as LayerSpecification;
 }
 
-/** The whole style; `tiles` gives the template of a layer's tiles. */
-export function styleOf(colours: Palette, tiles: (layer: string) => string): StyleSpecification {
-  const nothing: SourceSpecification = { type: "geojson", data: { type: "FeatureCollection", features: [] } };
+/** The layers, each shown or hidden as its group is in the beginning. */
+export function shownLayers(colours: Palette): LayerSpecification[] {
+  return dataLayers(colours).map(hidden);
+}
+
+/** The style without any data. */
+export function groundStyle(colours: Palette): StyleSpecification {
+  const ground: LayerSpecification = {
+    type: "background",
+    id: "ground",
+    paint: { "background-color": colours.ground },
+  };
+  return { version: 8, sources: {}, layers: [ground] };
+}
+
+/** Every source by its name; `tiles` gives the template of a layer's tiles. */
+export function sources(tiles: (layer: string) => string): [string, SourceSpecification][] {
   const tiled = TILE_SOURCES.map((name): [string, SourceSpecification] => [
     name,
     { type: "vector", tiles: [tiles(name)], maxzoom: DEEPEST_ZOOM },
   ]);
-  const featured = FEATURE_SOURCES.map((name): [string, SourceSpecification] => [name, { ...nothing }]);
-  return {
-    version: 8,
-    sources: Object.fromEntries([...tiled, ...featured]),
-    layers: [
-      { type: "background", id: "ground", paint: { "background-color": colours.ground } },
-      ...dataLayers(colours).map(hidden),
-    ],
-  };
+  const featured = FEATURE_SOURCES.map((name): [string, SourceSpecification] => [
+    name,
+    { type: "geojson", data: { type: "FeatureCollection", features: [] } },
+  ]);
+  return [...tiled, ...featured];
 }
 
 /** The source of a raster, and its layer, which lies under everything else. */
