@@ -177,7 +177,7 @@ label_gains = Table(
     _feature_id(),
     _whole("map_version"),
     *(_text(column) for column in ("image", "landmarks_json", "terms_json")),
-    UniqueConstraint("image", "map_version"),
+    UniqueConstraint("map_version", "image"),
 )
 
 map_versions = Table(

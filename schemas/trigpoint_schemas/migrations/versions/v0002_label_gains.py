@@ -16,7 +16,7 @@ def upgrade() -> None:
         sa.Column("fid", sa.BigInteger, primary_key=True),
         sa.Column("map_version", sa.BigInteger, nullable=False),
         *(sa.Column(name, sa.Text, nullable=False) for name in ("image", "landmarks_json", "terms_json")),
-        sa.UniqueConstraint("image", "map_version"),
+        sa.UniqueConstraint("map_version", "image"),
     )
 
 
