@@ -1,7 +1,7 @@
 """What would become of a label, where the next one would help most, and which ground the images show."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -76,7 +76,7 @@ class AnchorAdvice:
                 return found
             if found.reason == "signature":
                 return found
-        return found
+        return found if found.nearest else replace(found, reason=f"no landmark within {REACHES_M[-1]:g} m")
 
     async def _around(
         self, place: Point, reach_m: float, facts: MapFacts, state: MapState, label: ProspectiveLabel
