@@ -21,7 +21,8 @@ from trigpoint_landmarks.http.ports import DrivenPath, JudgedFix, MapCorrections
 
 VERTICES_MOST = 2000  # of a drive's path
 FIXES_MOST = 5000
-FRESH_S = 5.0  # how long what was read of the log is shown again
+FRESH_S = 5.0  # how long what was read of the log is shown again at least
+READING_SHARE = 20.0  # and so many times as long as reading it took
 DEGREE_DECIMALS = 9
 SOURCES: tuple[PathSource, ...] = ("odometry", "filtered")
 
@@ -30,7 +31,7 @@ Read = TypeVar("Read")
 
 class LoggedDrives:
     """Answers from the log; without one there is nothing, and no error. Whatever is long to read is read by one asker
-    at a time, and shown to all who ask within `FRESH_S`."""
+    at a time, and shown to all who ask soon after."""
 
     def __init__(
         self,
@@ -41,7 +42,7 @@ class LoggedDrives:
     ) -> None:
         self._drives, self._corrections, self._now_s = drives, corrections, now_s
         self._one_at_a_time = asyncio.Lock()
-        self._held: dict[Hashable, tuple[float, Any]] = {}
+        self._held: dict[Hashable, tuple[float, Any]] = {}  # until when, and what
 
     async def paths(self, asked: Asked, map_version: int | None) -> Response:
         """Drives' paths. Raises InputError, ServiceError."""
@@ -82,9 +83,11 @@ class LoggedDrives:
     async def _read(self, key: Hashable, reading: Callable[[], Read]) -> Read:
         async with self._one_at_a_time:
             held = self._held.get(key)
-            if held is None or self._now_s() - held[0] > FRESH_S:
+            if held is None or self._now_s() >= held[0]:
+                began_s = self._now_s()
                 found = await asyncio.to_thread(reading)
-                held = self._held[key] = (self._now_s(), found)
+                cost_s = self._now_s() - began_s
+                held = self._held[key] = (self._now_s() + max(FRESH_S, READING_SHARE * cost_s), found)
         read: Read = held[1]
         return read
 
