@@ -1,5 +1,6 @@
 /** Gets what belongs to the version that is shown, and has it drawn. */
 import { type MapApi, Refused, said } from "./api.ts";
+import { fittedFactor } from "./map/exaggeration.ts";
 import {
   anchorPoints,
   collected,
@@ -48,7 +49,11 @@ export class MapData {
     });
     store.on(["selectedAt"], ({ selectedAt }) => view.draw("selected", point(selectedAt)));
     store.on(["ellipseFactor", "crs"], () => this.drawEllipses());
-    view.whenSettled(() => this.drawEllipses());
+    store.on(["arrowsFitted", "anchors"], () => this.fitArrows());
+    view.whenSettled(() => {
+      this.fitArrows();
+      this.drawEllipses();
+    });
   }
 
   /** Everything of a version; of several asked for at once the last stays. */
@@ -89,6 +94,14 @@ export class MapData {
   private drawImages({ images, crs, arrowFactor }: ViewerState): void {
     this.view.draw("footprints", footprints(images, imageTitle));
     this.view.draw("offsets", offsetArrows(images, crs, arrowFactor));
+  }
+
+  private fitArrows(): void {
+    const { anchors, arrowsFitted } = this.store.state;
+    const residualsM = anchors.map((one) => one.properties.residual_m).filter((one) => one !== null);
+    if (arrowsFitted && residualsM.length) {
+      this.store.set({ arrowFactor: fittedFactor(residualsM, this.view.pixelM()) });
+    }
   }
 
   private drawn = "";

@@ -26,6 +26,8 @@ export interface ViewerState {
   selectedAt: LonLat | null;
   /** How many times as long as they are arrows are drawn, and as large ellipses. */
   arrowFactor: number;
+  /** Whether the arrows' factor goes with the view. */
+  arrowsFitted: boolean;
   ellipseFactor: number;
   /** What went wrong last in getting what is shown; "" for nothing. */
   trouble: string;
@@ -45,6 +47,7 @@ export const BEGINNING: ViewerState = {
   selection: null,
   selectedAt: null,
   arrowFactor: 20,
+  arrowsFitted: true,
   ellipseFactor: 1,
   trouble: "",
 };

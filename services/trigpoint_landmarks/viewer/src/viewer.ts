@@ -56,7 +56,8 @@ export class Viewer {
       { id: "next", title: "Next", content: next.element, shown: () => this.offerSuggestions(list) },
       { id: "list", title: "List", content: list.element, shown: () => void this.list(list) },
     ]);
-    fill(places.panel, this.details().element, this.tabs.element);
+    const scrolled = el("div", { class: "scrolled" }, this.details().element, this.tabs.panels);
+    fill(places.panel, this.tabs.list, scrolled);
     fill(places.versions, new VersionBar(store, (wanted, following) => this.showVersion(wanted, following)).element);
     this.view.whenPointed((at, pointed) => this.pointed(at, pointed));
     store.on(["link"], ({ link }) => void this.follow(link.newest));
@@ -104,8 +105,8 @@ export class Viewer {
   }
 
   private async showGroup(group: string, shown: boolean): Promise<void> {
-    if (shown) await this.data.showDriven(group);
     this.view.show(group, shown);
+    if (shown) await this.data.showDriven(group);
   }
 
   private offerSuggestions(list: ListPanel): void {
@@ -144,7 +145,7 @@ export class Viewer {
 
   private labelSuggested(one: Suggestion): void {
     const image = one.image || one.image_choices[0];
-    if (image) this.labelling.change({ image });
+    if (image) this.labelling.chooseImage(image);
     this.labelAt(one.position);
   }
 }

@@ -136,14 +136,15 @@ export interface Suggestion {
   position: LonLat;
   sigma_major_m: number;
   variance_reduction_m2: number;
-  share: number;
+  /** Of the map's summed variance, where that is known. */
+  share: number | null;
   image: string;
   image_choices: string[];
 }
 
 export interface Suggestions {
   map_version: number | null;
-  summed_variance_m2: number;
+  summed_variance_m2: number | null;
   suggestions: Suggestion[];
   method: string;
 }

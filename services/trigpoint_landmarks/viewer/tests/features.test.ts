@@ -1,6 +1,7 @@
 import type { MultiLineString, Polygon } from "geojson";
 import { describe, expect, it } from "vitest";
 import { distanceM, SIGMAS_95 } from "../src/geo.ts";
+import { fittedFactor } from "../src/map/exaggeration.ts";
 import { ellipses, prospect, residualArrows, suggestionRings } from "../src/map/features.ts";
 import type { AnchorFeature, Association, LonLat, Suggestion } from "../src/wire.ts";
 
@@ -73,5 +74,16 @@ describe("suggestions", () => {
       ({ rank, landmark: `L${rank}`, position: SYDNEY, variance_reduction_m2: gain }) as Suggestion;
     const radii = suggestionRings([one(1, 4), one(2, 1)]).features.map(({ properties }) => properties["radius"]);
     expect(radii).toEqual([25, 17]);
+  });
+});
+
+describe("the arrows' factor", () => {
+  it("suits the view: the longer residuals are a finger's breadth long, or less", () => {
+    expect(fittedFactor([0.1, 0.2, 0.3], 0.9)).toBe(50);
+    expect(fittedFactor([0.1, 0.2, 0.3], 0.1)).toBe(10);
+  });
+
+  it("is 1 where residuals are long already", () => {
+    expect(fittedFactor([40], 0.1)).toBe(1);
   });
 });

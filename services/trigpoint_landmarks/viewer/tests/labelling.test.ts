@@ -1,8 +1,8 @@
 import { describe, expect, it } from "vitest";
 import { distanceM } from "../src/geo.ts";
 import { anchorId, settled } from "../src/labelling/awaited.ts";
-import { EMPTY_DRAFT, freeName, labelOf, nudged, obstacle } from "../src/labelling/draft.ts";
-import type { AnchorFeature, LonLat } from "../src/wire.ts";
+import { EMPTY_DRAFT, freeName, imageAt, labelOf, nudged, obstacle } from "../src/labelling/draft.ts";
+import type { AerialImage, AnchorFeature, LonLat } from "../src/wire.ts";
 
 const SYDNEY: LonLat = [151.19, -33.89];
 const DRAFT = { ...EMPTY_DRAFT, position: SYDNEY, anchor: "label-31", image: "image-1-1" };
@@ -46,6 +46,25 @@ describe("a name", () => {
   it("is the first where there is no other", () => {
     expect(freeName([])).toBe("label-01");
     expect(freeName(["church"])).toBe("label-01");
+  });
+});
+
+describe("the image of a place", () => {
+  const square = (name: string, west: number): AerialImage => {
+    const ring = [0, 1, 2, 3, 0].map((corner) => [west + (corner % 3 ? 1 : 0), corner > 1 ? 1 : 0]);
+    const footprint = { type: "Polygon" as const, coordinates: [ring] };
+    return { image: name, footprint, footprint_source: "", offset_x_m: null, offset_y_m: null } as AerialImage;
+  };
+  const images = [square("west", 0), square("east", 2)];
+
+  it("is the one whose footprint holds it", () => {
+    expect(imageAt(images, [2.5, 0.5])).toBe("east");
+    expect(imageAt(images, [0.1, 0.9])).toBe("west");
+  });
+
+  it("is the nearest one's where none holds it, and none where there is no image", () => {
+    expect(imageAt(images, [1.9, 0.5])).toBe("east");
+    expect(imageAt([], [0, 0])).toBe("");
   });
 });
 

@@ -27,12 +27,12 @@ describe("server-sent events", () => {
 describe("the link", () => {
   it("is live once something was heard, and says how old the map is", () => {
     const words = spoken(linkAfter(UNLINKED, heard()), NOON_MS);
-    expect(words).toEqual({ tone: "good", title: "Live", detail: "version 7, solved 60 s ago" });
+    expect(words).toEqual({ tone: "good", title: "Live", detail: "version 7, 60 s old" });
   });
 
   it("measures the map's age with the service's clock", () => {
     const ahead = heard({ nowNs: (NOON_MS + 30_000) * 1e6 });
-    expect(spoken(linkAfter(UNLINKED, ahead), NOON_MS).detail).toContain("solved 2 min ago");
+    expect(spoken(linkAfter(UNLINKED, ahead), NOON_MS).detail).toContain("2 min old");
   });
 
   it("is offline since the first failure, not the last", () => {

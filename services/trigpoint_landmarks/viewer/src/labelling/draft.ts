@@ -1,6 +1,6 @@
 /** A label before it is submitted: its values, whether they can be, and what it will be called. */
-import { moved } from "../geo.ts";
-import type { LonLat, NewLabel } from "../wire.ts";
+import { distanceM, moved } from "../geo.ts";
+import type { AerialImage, LonLat, NewLabel } from "../wire.ts";
 
 export interface Draft {
   position: LonLat | null;
@@ -51,6 +51,25 @@ export function freeName(names: readonly string[]): string {
   const width = Math.max(2, ...own.map((digits) => digits.length));
   const next = 1 + Math.max(0, ...own.map(Number));
   return prefix + String(next).padStart(width, "0");
+}
+
+function holds(ring: readonly LonLat[], [lon, lat]: LonLat): boolean {
+  let inside = false;
+  ring.forEach(([toLon, toLat], index) => {
+    const [fromLon, fromLat] = ring.at(index - 1) as LonLat;
+    const crosses = toLat > lat !== fromLat > lat;
+    if (crosses && lon < fromLon + ((toLon - fromLon) * (lat - fromLat)) / (toLat - fromLat)) inside = !inside;
+  });
+  return inside;
+}
+
+/** The image a place was most likely labelled in: one whose footprint holds it, else the one nearest by a corner. */
+export function imageAt(images: readonly AerialImage[], position: LonLat): string {
+  const shown = images.map(({ image, footprint }) => ({ image, ring: (footprint?.coordinates[0] ?? []) as LonLat[] }));
+  const nearest = (ring: LonLat[]) => Math.min(...ring.map((corner) => distanceM(corner, position)));
+  const held = shown.find(({ ring }) => holds(ring, position));
+  const found = held ?? shown.toSorted((one, other) => nearest(one.ring) - nearest(other.ring))[0];
+  return found?.image ?? "";
 }
 
 const STEPS: Record<string, [number, number]> = {

@@ -8,7 +8,7 @@ import type { Store } from "../state.ts";
 import { metres } from "../text.ts";
 import type { Association, LonLat } from "../wire.ts";
 import { type Arrived, type Awaited, settled } from "./awaited.ts";
-import { type Draft, EMPTY_DRAFT, freeName, labelOf, obstacle } from "./draft.ts";
+import { type Draft, EMPTY_DRAFT, freeName, imageAt, labelOf, obstacle } from "./draft.ts";
 import { LabelMarker } from "./marker.ts";
 
 const ASK_AFTER_MS = 120; // while somebody drags, not every pixel is asked for
@@ -21,6 +21,7 @@ export class Labelling {
   awaited: readonly Awaited[] = [];
   news: readonly string[] = [];
   private readonly marker: LabelMarker;
+  private imageChosen = false;
   private timer = 0;
   private asking = new AbortController();
   private listeners: (() => void)[] = [];
@@ -43,8 +44,16 @@ export class Labelling {
   /** Puts the label somewhere; the rest of the draft stays. */
   place(position: LonLat): void {
     this.marker.put(position);
-    const anchor = this.draft.anchor || freeName(this.store.state.anchors.map((one) => one.properties.anchor));
-    this.change({ position, anchor });
+    const { anchors, images } = this.store.state;
+    const anchor = this.draft.anchor || freeName(anchors.map((one) => one.properties.anchor));
+    const image = this.imageChosen ? this.draft.image : imageAt(images, position);
+    this.change({ position, anchor, image });
+  }
+
+  /** The image the label is in, whatever is under it; the place suggests one until then. */
+  chooseImage(image: string): void {
+    this.imageChosen = true;
+    this.change({ image });
   }
 
   focusMarker(): void {
@@ -61,6 +70,7 @@ export class Labelling {
   /** Nothing is to be labelled any more. */
   clear(): void {
     const { image, sigma_m, image_sigma_m } = this.draft;
+    this.imageChosen = false;
     this.draft = { ...EMPTY_DRAFT, image, sigma_m, image_sigma_m };
     this.marker.put(null);
     this.know(null);

@@ -1,5 +1,7 @@
 /** How well this page is connected with the map, as a fold over what happens; and how it is said. */
-import { span, timeOfDay } from "../text.ts";
+import { moment, span, timeOfDay } from "../text.ts";
+
+const LONG_AGO_S = 172_800; // beyond, a date says more
 
 /** "events": told at once; "polling": asked every few seconds; "offline": nobody answers. */
 export type Way = "connecting" | "events" | "polling" | "offline";
@@ -63,7 +65,8 @@ export interface Spoken {
 /** How old the newest version is, in words; nothing where that is not known. */
 export function age(link: Link, nowMs: number): string {
   if (link.solvedNs === null || link.clockAheadMs === null) return "";
-  return `solved ${span((nowMs + link.clockAheadMs - link.solvedNs / 1e6) / 1000)} ago`;
+  const seconds = (nowMs + link.clockAheadMs - link.solvedNs / 1e6) / 1000;
+  return seconds < LONG_AGO_S ? `${span(seconds)} old` : `of ${moment(link.solvedNs)}`;
 }
 
 function version(link: Link): string {

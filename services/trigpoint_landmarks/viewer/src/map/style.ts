@@ -86,7 +86,8 @@ function landmarkLayers(colours: Palette): LayerSpecification[] {
 }
 
 function anchorLayers(colours: Palette): LayerSpecification[] {
-  const icon = (name: unknown) => ({ layout: { "icon-image": name, "icon-allow-overlap": true } });
+  const size = ["interpolate", ["linear"], ["zoom"], 15, 0.6, 18, 1];
+  const icon = (name: unknown) => ({ layout: { "icon-image": name, "icon-allow-overlap": true, "icon-size": size } });
   return [
     line("residuals", "residuals", colours.anchor, { "line-width": 2 }),
     layer("symbol", "fixes", "fixes", {}, icon("rejected")),
@@ -112,7 +113,7 @@ function suggestionLayers(colours: Palette): LayerSpecification[] {
     "text-field": ["to-string", ["get", "rank"]],
     "text-font": FONT,
     "text-size": 12,
-    "text-offset": [0, -1.9],
+    "text-offset": [0, -2.8],
     "symbol-sort-key": ["get", "rank"],
   };
   const paint = { "text-color": colours.suggestion, "text-halo-color": colours.ground, "text-halo-width": 2 };

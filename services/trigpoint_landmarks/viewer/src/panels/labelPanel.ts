@@ -5,7 +5,7 @@ import { obstacle } from "../labelling/draft.ts";
 import type { Labelling } from "../labelling/labelling.ts";
 import type { MapView } from "../map/mapView.ts";
 import type { Store } from "../state.ts";
-import { metres, percent } from "../text.ts";
+import { metres } from "../text.ts";
 import type { Association, LonLat } from "../wire.ts";
 
 const SURVEY = "";
@@ -65,9 +65,10 @@ export class LabelPanel {
       { class: "labelling", onsubmit: (event: SubmitEvent) => void this.submitted(event), novalidate: true },
       el("h2", {}, "Label an anchor"),
       el("p", { class: "muted" }, "Click the map where an aerial image shows a landmark, or set the marker down here."),
+      this.progress,
       this.placing(),
-      this.naming(),
       this.preview,
+      this.naming(),
       el(
         "div",
         { class: "actions" },
@@ -75,9 +76,8 @@ export class LabelPanel {
         button("Clear", () => labelling.clear()),
       ),
       this.trouble,
-      this.progress,
     );
-    this.element = el("div", {}, token, this.element);
+    this.element = el("div", { class: "label-body" }, this.element, token);
     store.on(["images"], () => this.offerImages());
     store.on(["access"], ({ access }) => {
       this.submit.disabled = access?.can_label === false;
@@ -110,7 +110,10 @@ export class LabelPanel {
 
   private naming(): HTMLElement {
     const changed = () => this.labelling.change(this.entered());
-    for (const control of [this.image, this.imageName, this.sigma, this.imageSigma, this.anchor]) {
+    const chosen = () => this.labelling.chooseImage(this.entered().image);
+    this.image.addEventListener("change", chosen);
+    this.imageName.addEventListener("change", chosen);
+    for (const control of [this.sigma, this.imageSigma, this.anchor]) {
       control.addEventListener("change", changed);
     }
     this.offerImages();
@@ -147,7 +150,7 @@ export class LabelPanel {
 
   private render(): void {
     const { draft, association, trouble } = this.labelling;
-    if (draft.image && [...this.image.options].some((one) => one.value === draft.image)) this.image.value = draft.image;
+    this.showImage(draft.image);
     this.otherImage.hidden = this.image.value !== ANOTHER;
     this.latitude.value = draft.position ? draft.position[1].toFixed(8) : "";
     this.longitude.value = draft.position ? draft.position[0].toFixed(8) : "";
@@ -157,6 +160,12 @@ export class LabelPanel {
     if (association) fill(this.preview, verdict(association), reasons(association));
     else fill(this.preview, el("p", {}, trouble || "Asking what it would be tied to…"));
     this.renderProgress();
+  }
+
+  /** The image as it is in the draft: one of those known, or another whose name is being typed. */
+  private showImage(image: string): void {
+    const known = [...this.image.options].some((one) => one.value === image);
+    if (known && (image || this.image.value !== ANOTHER)) this.image.value = image;
   }
 
   private renderProgress(): void {
@@ -183,9 +192,4 @@ export class LabelPanel {
       this.trouble.textContent = said(error);
     }
   }
-}
-
-/** A share of the map's variance in words. */
-export function shareOf(share: number): string {
-  return `${percent(share)} of the map's variance`;
 }

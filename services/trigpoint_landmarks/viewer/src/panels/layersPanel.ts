@@ -3,7 +3,7 @@ import { el, fill } from "../dom.ts";
 import { LAYER_GROUPS, type LayerGroup, type Swatch } from "../map/layerGroups.ts";
 import type { Store } from "../state.ts";
 import type { Raster } from "../wire.ts";
-import { factorChoice } from "./versionBar.ts";
+import { arrowChoice, factorChoice } from "./factorChoice.ts";
 
 const SVG = "http://www.w3.org/2000/svg";
 const SHAPES: Record<Swatch, [string, Record<string, string>]> = {
@@ -100,8 +100,7 @@ export class LayersPanel {
       return factorChoice("Ellipses drawn", [1, 5, 20, 100], store.state.ellipseFactor, choose);
     }
     if (group.id === "residuals") {
-      const choose = (arrowFactor: number) => store.set({ arrowFactor });
-      return factorChoice("Arrows drawn", [1, 5, 20, 100], store.state.arrowFactor, choose);
+      return arrowChoice(store);
     }
     return null;
   }

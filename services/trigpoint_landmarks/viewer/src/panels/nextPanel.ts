@@ -6,10 +6,16 @@ import type { Store } from "../state.ts";
 import { metres, percent, squareMetres } from "../text.ts";
 import type { Suggestion, Suggestions } from "../wire.ts";
 
+function shareOf({ share }: Suggestion): string {
+  return share === null ? "of an unknown whole" : `${percent(share)} of the map's variance`;
+}
+
 export class NextPanel {
   readonly element: HTMLElement;
   private readonly list = el("ol", { class: "ranked" });
   private readonly about = el("p", { class: "muted" });
+  private readonly method = el("p", { class: "muted" });
+  private readonly how = el("details", {}, el("summary", {}, "How this is worked out"), this.method);
   private readonly stepper: HTMLElement;
   private at = -1;
 
@@ -25,7 +31,7 @@ export class NextPanel {
       button("Previous", () => this.step(-1)),
       button("Next", () => this.step(1), { class: "primary" }),
     );
-    this.element = el("div", {}, el("h2", {}, "Where to label next"), this.about, this.stepper, this.list);
+    this.element = el("div", {}, el("h2", {}, "Where to label next"), this.about, this.stepper, this.list, this.how);
     store.on(["suggestions"], ({ suggestions }) => {
       this.at = -1;
       this.render(suggestions);
@@ -37,17 +43,19 @@ export class NextPanel {
     this.stepper.hidden = !rows.length;
     this.about.textContent = found
       ? rows.length
-        ? `Best first. ${found.method}`
+        ? "One more anchor would make the whole map the more certain, the higher its landmark stands here."
         : "No single anchor would make this map more certain."
       : "This service does not say where an anchor would help.";
+    this.method.textContent = found?.method ?? "";
+    this.how.hidden = !found;
     fill(this.list, ...rows.map((one, index) => this.row(one, index)));
   }
 
   private row(one: Suggestion, index: number): HTMLElement {
     const chosen = index === this.at;
     const bar = el("span", { class: "bar", "aria-hidden": "true" });
-    bar.style.setProperty("--share", String(one.share));
-    const gain = `takes off ${squareMetres(one.variance_reduction_m2)}, ${percent(one.share)} of the map's variance`;
+    bar.style.setProperty("--share", String(one.share ?? 0));
+    const gain = `takes off ${squareMetres(one.variance_reduction_m2)}, ${shareOf(one)}`;
     const head = button("", () => this.choose(index), { class: "row", "aria-current": chosen ? "true" : null });
     fill(
       head,
@@ -78,6 +86,6 @@ export class NextPanel {
     if (focused) this.list.querySelectorAll<HTMLButtonElement>("button.row")[index]?.focus();
     this.view.goTo(one.position);
     this.store.set({ selection: null, selectedAt: one.position });
-    this.speech.say(`${one.rank}: ${one.kind} ${one.landmark}, ${percent(one.share)} of the map's variance`);
+    this.speech.say(`${one.rank}: ${one.kind} ${one.landmark}, ${shareOf(one)}`);
   }
 }

@@ -9,9 +9,10 @@ export interface Tab {
 }
 
 export class Tabs {
-  readonly element: HTMLElement;
+  readonly list: HTMLElement;
+  readonly panels: HTMLElement;
   private readonly handles: HTMLButtonElement[];
-  private readonly panels: HTMLElement[];
+  private readonly contents: HTMLElement[];
 
   constructor(private readonly tabs: readonly Tab[]) {
     this.handles = tabs.map((tab, index) =>
@@ -28,15 +29,15 @@ export class Tabs {
         tab.title,
       ),
     );
-    this.panels = tabs.map((tab) =>
+    this.contents = tabs.map((tab) =>
       el(
         "div",
         { role: "tabpanel", id: `panel-${tab.id}`, "aria-labelledby": `tab-${tab.id}`, tabindex: "-1" },
         tab.content,
       ),
     );
-    const list = el("div", { role: "tablist", "aria-label": "What to do", class: "tabs" }, ...this.handles);
-    this.element = el("div", { class: "tabbed" }, list, el("div", { class: "panels" }, ...this.panels));
+    this.list = el("div", { role: "tablist", "aria-label": "What to do", class: "tabs" }, ...this.handles);
+    this.panels = el("div", { class: "panels" }, ...this.contents);
     this.choose(0);
   }
 
@@ -45,7 +46,7 @@ export class Tabs {
   }
 
   isOpen(id: string): boolean {
-    return this.panels[this.tabs.findIndex((tab) => tab.id === id)]?.hidden === false;
+    return this.contents[this.tabs.findIndex((tab) => tab.id === id)]?.hidden === false;
   }
 
   private choose(chosen: number): void {
@@ -53,7 +54,7 @@ export class Tabs {
       handle.setAttribute("aria-selected", String(index === chosen));
       handle.tabIndex = index === chosen ? 0 : -1;
     });
-    this.panels.forEach((panel, index) => {
+    this.contents.forEach((panel, index) => {
       panel.hidden = index !== chosen;
     });
     this.tabs[chosen]?.shown?.();

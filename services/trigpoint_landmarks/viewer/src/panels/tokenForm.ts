@@ -34,6 +34,7 @@ export function tokenForm(store: Store, changed: () => void): HTMLElement {
   const form = el("section", { class: "card token", "aria-label": "Token" });
   store.on(["access"], ({ access }) => {
     form.hidden = access === null || (access.can_label && !keptToken());
+    form.classList.toggle("entered", access?.can_label === true);
     why.textContent = access?.can_label ? `Labelling as ${access.name}.` : (access?.why_not_label ?? "");
     fill(form, why, access?.can_label ? null : enter, keptToken() ? forget : null);
   });

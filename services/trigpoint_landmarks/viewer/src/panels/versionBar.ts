@@ -1,15 +1,15 @@
 /** Which map version is shown: a slider over all of them, and whether to go along with the newest. */
-import { button, el, options } from "../dom.ts";
+import { button, el } from "../dom.ts";
 import type { Store, ViewerState } from "../state.ts";
-import { counted, moment } from "../text.ts";
+import { counted } from "../text.ts";
 
 const SETTLED_MS = 120; // a slider that is dragged passes many versions
 
 function described({ versions, shown }: ViewerState): string {
   const summary = versions?.history?.find((one) => one.map_version === shown);
   if (!summary) return "";
-  const { method, landmark_count: landmarks, anchor_count: anchors, solved_ns: solved } = summary;
-  return `${method}, ${counted(landmarks, "landmark")}, ${counted(anchors, "anchor")}, solved ${moment(solved)}`;
+  const { method, landmark_count: landmarks, anchor_count: anchors } = summary;
+  return `${method}, ${counted(landmarks, "landmark")}, ${counted(anchors, "anchor")}`;
 }
 
 function shownText({ versions, shown, link }: ViewerState): string {
@@ -86,21 +86,4 @@ export class VersionBar {
     if (newest === undefined) return;
     this.showVersion(following ? newest : (this.store.state.shown ?? newest), following);
   }
-}
-
-/** A choice of how many times as large something is drawn as it is. */
-export function factorChoice(
-  label: string,
-  factors: readonly number[],
-  chosen: number,
-  choose: (factor: number) => void,
-) {
-  const select = el("select", { id: `factor-${label.split(" ")[0]?.toLowerCase()}` });
-  options(
-    select,
-    factors.map((factor) => [String(factor), factor === 1 ? "× 1, true to scale" : `× ${factor}`] as const),
-  );
-  select.value = String(chosen);
-  select.addEventListener("change", () => choose(Number(select.value)));
-  return el("div", { class: "choice" }, el("label", { for: select.id }, label), select);
 }
