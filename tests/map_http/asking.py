@@ -33,7 +33,7 @@ class Api:
 
     def ask(self, method: str, path: str, **more: Any) -> httpx.Response:
         """The answer to one request."""
-        return self.runner.run(self._ask(method, path, **more))
+        return self.runner.run(self.asked(method, path, **more))
 
     def get(self, path: str, **more: Any) -> httpx.Response:
         """The answer to a GET."""
@@ -49,7 +49,8 @@ class Api:
         """The ids of a page's features."""
         return [feature["id"] for feature in self.told(path, **parameters)["features"]]
 
-    async def _ask(self, method: str, path: str, *, client: str = "127.0.0.1", **more: Any) -> httpx.Response:
+    async def asked(self, method: str, path: str, *, client: str = "127.0.0.1", **more: Any) -> httpx.Response:
+        """The answer to one request, in the event loop."""
         transport = httpx.ASGITransport(app=self.served, client=(client, 1234))
         async with httpx.AsyncClient(transport=transport, base_url=BASE_URL) as asking:
             return await asking.request(method, path, **more)

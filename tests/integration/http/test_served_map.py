@@ -151,6 +151,18 @@ def test_a_process_told_to_stop_ends_well(tmp_path: Path, database: Path) -> Non
         assert served.popen.wait(30.0) == 0
 
 
+def test_who_listens_does_not_hold_up_the_end(tmp_path: Path, database: Path) -> None:
+    with (
+        served_map(tmp_path, database=geopackage_line(database)) as served,
+        urllib.request.urlopen(f"{served.url}/events", timeout=30.0) as listening,
+    ):
+        assert listening.headers["content-type"].startswith("text/event-stream")
+        assert listening.readline() == b"event: version\n"
+        served.popen.terminate()
+        assert served.popen.wait(4.0) == 0  # s: less than requests under way are given
+        assert listening.read().endswith(b"\n\n")
+
+
 def test_a_process_without_a_database_waits_for_one(tmp_path: Path) -> None:
     path = tmp_path / "later.gpkg"
     GeoPackageStore(path).close()
