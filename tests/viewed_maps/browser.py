@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from playwright.sync_api import Browser, ConsoleMessage, Page, sync_playwright
+from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
 
 from trigpoint_landmarks.http.viewer_files import BUILT
 
@@ -36,7 +36,7 @@ def missing() -> str:
     return "" if shutil.which("chromium") else "chromium is not installed"
 
 
-@dataclass(slots=True)
+@dataclass
 class Viewed:
     """The viewer on a page; `complaints` are errors and warnings of its console, and uncaught exceptions."""
 
@@ -78,6 +78,7 @@ class Viewed:
 @contextmanager
 def chromium() -> Iterator[Browser]:
     """The browser, which has shown a page already: what it begins with once is not any page's time."""
+    expect.set_options(timeout=SOON_MS)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=list(FLAGS))
         try:

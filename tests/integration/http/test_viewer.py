@@ -103,11 +103,11 @@ def test_an_older_version_is_shown_with_the_slider_s_keys(page: Viewed) -> None:
 
 def test_layers_are_switched_off_and_on(page: Viewed) -> None:
     before = page.pixels()
-    page.page.get_by_label("Landmarks ringed").uncheck()
-    expect(page.page.get_by_label("Landmarks ringed")).not_to_be_checked()
+    page.page.get_by_role("checkbox", name="Landmarks").uncheck()
+    expect(page.page.get_by_role("checkbox", name="Landmarks")).not_to_be_checked()
     wait_until(lambda: page.pixels() != before, "another picture")
-    page.page.get_by_label("Optimised paths").press("Space")
-    expect(page.page.get_by_label("Optimised paths")).not_to_be_checked()
+    page.page.get_by_role("checkbox", name="Optimised paths").press("Space")
+    expect(page.page.get_by_role("checkbox", name="Optimised paths")).not_to_be_checked()
 
 
 def test_every_fact_of_a_landmark_is_read_by_keyboard(page: Viewed) -> None:

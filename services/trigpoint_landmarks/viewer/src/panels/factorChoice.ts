@@ -36,7 +36,7 @@ export function arrowChoice(store: Store): HTMLElement {
     store.set(arrowsFitted ? { arrowsFitted } : { arrowsFitted, arrowFactor: Number(select.value) });
   });
   store.on(["arrowFactor", "arrowsFitted"], ({ arrowFactor, arrowsFitted }) => {
-    options(select, [[FITTED, `to suit the view: × ${arrowFactor}`], ...ARROW_FACTORS.map(named)]);
+    options(select, [[FITTED, `fitted: × ${arrowFactor}`], ...ARROW_FACTORS.map(named)]);
     select.value = arrowsFitted ? FITTED : String(arrowFactor);
   });
   return element;

@@ -73,7 +73,9 @@ export class LayersPanel {
   }
 
   private row(entry: Entry, mark: SVGElement, below: HTMLElement | null): HTMLElement {
-    const box = el("input", { type: "checkbox", id: `layer-${entry.id}` });
+    const id = `layer-${entry.id}`;
+    const names = { "aria-labelledby": `${id}-title`, "aria-describedby": entry.hint ? `${id}-hint` : null };
+    const box = el("input", { type: "checkbox", id, ...names });
     box.checked = entry.shown;
     const trouble = el("span", { class: "trouble" });
     box.addEventListener("change", async () => {
@@ -85,7 +87,8 @@ export class LayersPanel {
       }
     });
     this.boxes.set(entry.id, box);
-    const text = el("span", {}, entry.title, entry.hint ? el("small", {}, entry.hint) : null, trouble);
+    const hint = entry.hint ? el("small", { id: `${id}-hint` }, entry.hint) : null;
+    const text = el("span", { class: "layer-text" }, el("span", { id: `${id}-title` }, entry.title), hint, trouble);
     const label = el("label", { class: "layer", for: box.id }, mark, text, box);
     return el("div", {}, label, below);
   }
