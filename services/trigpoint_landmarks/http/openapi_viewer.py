@@ -55,7 +55,8 @@ def _list(item: JsonObject) -> JsonObject:
     return {"type": "array", "items": item}
 
 
-def _advice_paths() -> JsonObject:
+def _label_parameters() -> tuple[JsonObject, ...]:
+    """What is asked of a label."""
     degrees = (
         {**query("lat_deg", "Its latitude", {"type": "number", "minimum": -90, "maximum": 90}), "required": True},
         {**query("lon_deg", "Its longitude", {"type": "number", "minimum": -180, "maximum": 180}), "required": True},
@@ -66,15 +67,17 @@ def _advice_paths() -> JsonObject:
         query("signature", "Its known identity", SHORT),
         query("anchor", "Its name: a label of it in this image is replaced", SHORT),
     )
+    return (*degrees, *SIGMAS, *texts)
+
+
+def _advice_paths() -> JsonObject:
     limit = {"type": "integer", "minimum": 1, "maximum": SUGGESTIONS_MOST, "default": SUGGESTIONS}
     return {
         "/association": getting(
             "association",
             "What the next solve would do with a label",
             answers(JSON, _association_schema()),
-            *degrees,
-            *SIGMAS,
-            *texts,
+            *_label_parameters(),
             AS_OF,
             JSON_ONLY,
             tag=TAG,
