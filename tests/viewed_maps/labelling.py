@@ -12,7 +12,8 @@ SOLVED_MS = 300_000.0  # for a whole solve beside everything else a machine does
 
 def beside_a_suggestion(shown: Viewed) -> None:
     """The map gone to the next landmark whose label would help most."""
-    shown.tab("Next")
+    with shown.page.expect_response("**/anchor-suggestions**"):
+        shown.tab("Next")
     shown.page.get_by_role("button", name="Next", exact=True).press("Enter")
     expect(shown.page.locator(".ranked [aria-current]")).to_be_visible()
 

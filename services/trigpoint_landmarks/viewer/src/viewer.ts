@@ -113,7 +113,13 @@ export class Viewer {
     void list.show(false);
     this.layers.switch("suggestions", true);
     const { shown } = this.store.state;
-    if (shown !== null) void this.data.suggest(shown);
+    if (shown !== null) void this.suggest(shown);
+  }
+
+  private async suggest(version: number): Promise<void> {
+    await this.data.suggest(version);
+    const places = this.store.state.suggestions?.suggestions.map((one) => one.position) ?? [];
+    if (this.store.state.selectedAt === null) this.view.overview(places);
   }
 
   private async list(list: ListPanel): Promise<void> {

@@ -154,6 +154,16 @@ export class MapView {
     return (40_075_016.69 * Math.cos((lat * Math.PI) / 180)) / (512 * 2 ** this.map.getZoom());
   }
 
+  /** Goes to where all of the places can be seen, unless one of them can be seen already. */
+  overview(places: readonly LonLat[]): void {
+    const view = this.map.getBounds();
+    if (!places.length || places.some((place) => view.contains(place))) return;
+    const lons = places.map(([lon]) => lon);
+    const lats = places.map(([, lat]) => lat);
+    const box: Box = [Math.min(...lons), Math.min(...lats), Math.max(...lons), Math.max(...lats)];
+    this.map.fitBounds(box, { padding: AROUND_PX, maxZoom: CLOSE_ZOOM });
+  }
+
   /** Goes to a place; near enough to see single landmarks where `close`. */
   goTo(position: LonLat, close = true): void {
     this.map.easeTo({ center: position, zoom: close ? Math.max(this.map.getZoom(), CLOSE_ZOOM) : this.map.getZoom() });

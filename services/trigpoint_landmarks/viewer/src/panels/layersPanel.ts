@@ -1,4 +1,5 @@
 /** The legend, in which every entry can be switched on and off. */
+import { said } from "../api.ts";
 import { el, fill } from "../dom.ts";
 import { LAYER_GROUPS, type LayerGroup, type Swatch } from "../map/layerGroups.ts";
 import type { Store } from "../state.ts";
@@ -77,18 +78,21 @@ export class LayersPanel {
     const names = { "aria-labelledby": `${id}-title`, "aria-describedby": entry.hint ? `${id}-hint` : null };
     const box = el("input", { type: "checkbox", id, ...names });
     box.checked = entry.shown;
-    const trouble = el("span", { class: "trouble" });
+    const state = el("small", { role: "status" });
     box.addEventListener("change", async () => {
-      trouble.textContent = "";
+      state.className = "";
+      state.textContent = box.checked ? "loading…" : "";
       try {
         await this.show(entry.id, box.checked);
+        state.textContent = "";
       } catch (error) {
-        trouble.textContent = `not there: ${error instanceof Error ? error.message : error}`;
+        state.className = "trouble";
+        state.textContent = `not there: ${said(error)}`;
       }
     });
     this.boxes.set(entry.id, box);
     const hint = entry.hint ? el("small", { id: `${id}-hint` }, entry.hint) : null;
-    const text = el("span", { class: "layer-text" }, el("span", { id: `${id}-title` }, entry.title), hint, trouble);
+    const text = el("span", { class: "layer-text" }, el("span", { id: `${id}-title` }, entry.title), hint, state);
     const label = el("label", { class: "layer", for: box.id }, mark, text, box);
     return el("div", {}, label, below);
   }

@@ -17,7 +17,8 @@ export class NextPanel {
   private readonly method = el("p", { class: "muted" });
   private readonly how = el("details", {}, el("summary", {}, "How this is worked out"), this.method);
   private readonly stepper: HTMLElement;
-  private at = -1;
+  /** The landmark that is looked at, whatever its rank has become. */
+  private chosen = "";
 
   constructor(
     private readonly store: Store,
@@ -32,10 +33,7 @@ export class NextPanel {
       button("Next", () => this.step(1), { class: "primary" }),
     );
     this.element = el("div", {}, el("h2", {}, "Where to label next"), this.about, this.stepper, this.list, this.how);
-    store.on(["suggestions"], ({ suggestions }) => {
-      this.at = -1;
-      this.render(suggestions);
-    });
+    store.on(["suggestions"], ({ suggestions }) => this.render(suggestions));
   }
 
   private render(found: Suggestions | null): void {
@@ -52,7 +50,7 @@ export class NextPanel {
   }
 
   private row(one: Suggestion, index: number): HTMLElement {
-    const chosen = index === this.at;
+    const chosen = one.landmark === this.chosen;
     const bar = el("span", { class: "bar", "aria-hidden": "true" });
     bar.style.setProperty("--share", String(one.share ?? 0));
     const gain = `takes off ${squareMetres(one.variance_reduction_m2)}, ${shareOf(one)}`;
@@ -72,15 +70,17 @@ export class NextPanel {
   }
 
   private step(by: number): void {
-    const count = this.store.state.suggestions?.suggestions.length ?? 0;
-    if (count) this.choose((Math.max(this.at, by > 0 ? -1 : 0) + by + count) % count);
+    const rows = this.store.state.suggestions?.suggestions ?? [];
+    const at = rows.findIndex((one) => one.landmark === this.chosen);
+    const from = at < 0 && by < 0 ? 0 : at; // before the first stands the last
+    if (rows.length) this.choose((from + by + rows.length) % rows.length);
   }
 
   private choose(index: number): void {
     const { suggestions } = this.store.state;
     const one = suggestions?.suggestions[index];
     if (!suggestions || !one) return;
-    this.at = index;
+    this.chosen = one.landmark;
     const focused = this.list.contains(document.activeElement);
     this.render(suggestions);
     if (focused) this.list.querySelectorAll<HTMLButtonElement>("button.row")[index]?.focus();
