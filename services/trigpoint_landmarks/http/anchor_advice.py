@@ -100,7 +100,7 @@ class AnchorAdvice:
         """Where one more anchor would help most. Raises InputError, DatabaseUnavailable."""
         limit, sigmas = _limit_of(asked), _sigmas_of(asked)
         facts = await self.facts.of(state, as_of)
-        places = await self._places(facts, state)
+        places = await self.facts.places(state, facts)
         tied = {one.landmark for one in facts.anchors if one.landmark}
         best = facts.gains.best(limit, sigmas, images_at=lambda name: places.get(name, ()), out=tied)
         known = {one.landmark: one for one in await self._named([one.landmark for one in best], facts, state)}
@@ -115,17 +115,6 @@ class AnchorAdvice:
             ],
             "method": NO_GAINS if total_m2 is None else METHOD.format(version=facts.gains.map_version),
         }
-
-    async def _places(self, facts: MapFacts, state: MapState) -> Mapping[str, Sequence[str]]:
-        """Which of the images' ground each landmark is on."""
-        found: dict[str, list[str]] = {}
-        for image, ground in facts.footprints.items():
-            west, south, east, north = ground.ground.bounds
-            area = GridBox(easting_min_m=west, northing_min_m=south, easting_max_m=east, northing_max_m=north)
-            for one in await self.facts.landmarks(state, facts.map_version, area=area):
-                if ground.holds(one.grid_m):
-                    found.setdefault(one.landmark, []).append(image)
-        return found
 
     async def _named(self, names: Sequence[str], facts: MapFacts, state: MapState) -> list[KnownLandmark]:
         if not names:

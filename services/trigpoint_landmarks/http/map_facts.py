@@ -2,7 +2,7 @@
 
 import json
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -50,6 +50,7 @@ class FactsOfMap:
         self._held: OrderedDict[int, MapFacts] = OrderedDict()
         self._history: tuple[int, tuple[VersionSummary, ...]] = (0, ())
         self._gains: MapGains | None = None
+        self._places: tuple[int, Mapping[str, Sequence[str]]] = (0, {})
 
     async def history(self, state: MapState) -> tuple[VersionSummary, ...]:
         """The newest versions, in order. Raises DatabaseUnavailable."""
@@ -72,6 +73,22 @@ class FactsOfMap:
         """The landmarks of a version in an area that meet a condition. Raises DatabaseUnavailable."""
         found = await self._features(state, LANDMARKS, as_of, area=area, condition=condition)
         return [known_landmark(feature) for feature in found]
+
+    async def places(self, state: MapState, facts: MapFacts) -> Mapping[str, Sequence[str]]:
+        """On which of the images' ground each landmark is. Raises DatabaseUnavailable."""
+        if self._places[0] != facts.map_version:
+            self._places = (facts.map_version, await self._looked_for(state, facts))
+        return self._places[1]
+
+    async def _looked_for(self, state: MapState, facts: MapFacts) -> Mapping[str, Sequence[str]]:
+        found: dict[str, list[str]] = {}
+        for image, ground in facts.footprints.items():
+            west, south, east, north = ground.ground.bounds
+            area = GridBox(easting_min_m=west, northing_min_m=south, easting_max_m=east, northing_max_m=north)
+            for one in await self.landmarks(state, facts.map_version, area=area):
+                if ground.holds(one.grid_m):
+                    found.setdefault(one.landmark, []).append(image)
+        return found
 
     async def _looked_up(self, state: MapState, as_of: int) -> MapFacts:
         anchors = await self._features(state, ANCHORS, as_of)
@@ -152,8 +169,8 @@ def _known_image(told: Properties) -> KnownImage:
 
 def _rule_of(settings_json: str) -> AnchoringRule | None:
     """How a version of these settings ties labels, None where they do not say."""
-    settings = json.loads(settings_json)
     try:
+        settings = json.loads(settings_json)
         anchors = settings["anchors"]
         return AnchoringRule(
             is_anchored=settings["method"] == "anchored",
