@@ -13,7 +13,12 @@ BUILT = Path(__file__).resolve().parent.parent / "viewer" / "dist"
 PREFIX = "/viewer"
 PAGE = "index.html"
 YEAR_S = 31_536_000
-MIME_TYPES = {".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml", ".html": "text/html; charset=utf-8"}
+MIME_TYPES = {
+    ".js": "text/javascript",
+    ".css": "text/css",
+    ".svg": "image/svg+xml",
+    ".html": "text/html; charset=utf-8",
+}
 # Scripts, styles, workers, pictures and data come from this service alone; what MapLibre draws, it makes itself.
 POLICY = "; ".join(
     (
