@@ -26,7 +26,7 @@ from trigpoint_landmarks.core.label_preview import (
 )
 from trigpoint_landmarks.http.asked import Asked
 from trigpoint_landmarks.http.documents import JsonObject
-from trigpoint_landmarks.http.map_facts import FactsOfMap, MapFacts
+from trigpoint_landmarks.http.map_facts import Bounds, FactsOfMap, MapFacts
 
 REACHES_M = (40.0, 400.0, 4000.0)  # within which landmarks are looked for, one after the other
 SIGMA_M, IMAGE_SIGMA_M = 0.10, 0.35  # what is usual
@@ -50,7 +50,6 @@ class AnchorAdvice:
     """Advice from what is known of a map version."""
 
     facts: FactsOfMap
-    recorded: Mapping[str, tuple[float, float, float, float]]  # west, south, east, north of images, in degrees
 
     async def association(self, asked: Asked, state: MapState, as_of: int) -> JsonObject:
         """What the next solve would do with a label. Raises InputError, DatabaseUnavailable."""
@@ -125,8 +124,9 @@ class AnchorAdvice:
     async def images(self, state: MapState, as_of: int) -> JsonObject:
         """The images the map knows of: their ground, and their offsets. Raises DatabaseUnavailable."""
         facts = await self.facts.of(state, as_of)
-        names = sorted({*self.recorded, *facts.images, *facts.footprints})
-        rows = [_image(name, facts, self.recorded.get(name), state.crs) for name in names]
+        recorded = self.facts.recorded
+        names = sorted({*recorded, *facts.images, *facts.footprints})
+        rows = [_image(name, facts, recorded.get(name), state.crs) for name in names]
         return {"map_version": as_of, "images": rows}
 
 
@@ -230,7 +230,7 @@ def _suggested(
     }
 
 
-def _image(name: str, facts: MapFacts, box: tuple[float, float, float, float] | None, crs: str) -> JsonObject:
+def _image(name: str, facts: MapFacts, box: Bounds | None, crs: str) -> JsonObject:
     offset: Mapping[str, Any] | None = facts.images.get(name)
     ground = facts.footprints.get(name)
     major = minor = heading = None
@@ -256,7 +256,7 @@ def _polygon(ground: Footprint, crs: str) -> JsonObject:
     return {"type": "Polygon", "coordinates": [corners]}
 
 
-def _box_polygon(box: tuple[float, float, float, float]) -> JsonObject:
+def _box_polygon(box: Bounds) -> JsonObject:
     west, south, east, north = box
     corners = [[west, south], [east, south], [east, north], [west, north], [west, south]]
     return {"type": "Polygon", "coordinates": [corners]}

@@ -40,6 +40,9 @@ from trigpoint_landmarks.http.rasters import Rasters
 from trigpoint_landmarks.http.settings import MEBIBYTE, WebSettings
 from trigpoint_landmarks.http.tiles import Tiles, asked_version, tile_of, tiled_layer
 from trigpoint_landmarks.http.viewer_api import ViewerApi
+from trigpoint_landmarks.http.viewer_files import PREFIX as VIEWER_PREFIX
+
+VIEWER_FILES = f"{VIEWER_PREFIX}{{file:path}}"
 
 Handler = Callable[[Request], Awaitable[Response]]
 
@@ -251,7 +254,7 @@ def application(settings: WebSettings, served: Served, instruments: Instruments)
     written = (route.path for route in router.routes if isinstance(route, APIRoute))
     beside = Beside(
         feed=VersionFeed(served.watch, instruments, limit=settings.listeners),
-        measures=RequestMeasures(instruments, (*routes, *written, EVENTS_PATH)),
+        measures=RequestMeasures(instruments, (*routes, *written, EVENTS_PATH, VIEWER_FILES)),
     )
     return _with_origins(Front(framework, api, admission, settings, beside=beside), settings)
 
@@ -269,7 +272,7 @@ def _map_api(settings: WebSettings, served: Served, instruments: Instruments, *,
             public=public,
             instruments=instruments,
         ),
-        facts=FactsOfMap(source),
+        facts=FactsOfMap(source, {image: one.bounds for one in settings.rasters for image in one.images}),
         layers=tuple(layer for layer in LAYERS.values() if layer.stored or corrections is not None),
         written=corrections_definition(),
     )
@@ -279,7 +282,7 @@ def _viewer_api(settings: WebSettings, served: Served, facts: FactsOfMap) -> Vie
     return ViewerApi(
         settings=settings,
         watch=served.watch,
-        advice=AnchorAdvice(facts, {image: one.bounds for one in settings.rasters for image in one.images}),
+        advice=AnchorAdvice(facts),
         drives=LoggedDrives(served.drives, served.corrections),
         rasters=Rasters({one.name: one for one in settings.rasters}),
         can_write=served.corrections is not None,

@@ -11,6 +11,7 @@ from trigpoint.anchoring.association import AssociationLimits
 from trigpoint.landmarks.conditions import Condition
 from trigpoint.landmarks.feature_query import PAGE_MOST, FeatureQuery, FeatureSource, GridBox, MapState, VersionSummary
 from trigpoint.landmarks.layers import ANCHORS, IMAGE_OFFSETS, LANDMARKS, Layer
+from trigpoint.landmarks.queries import DegreeBox
 from trigpoint_landmarks.core.footprints import Footprint, label_footprints
 from trigpoint_landmarks.core.label_gains import MapGains
 from trigpoint_landmarks.core.label_preview import AnchoringRule, KnownAnchor, KnownImage, KnownLandmark
@@ -19,6 +20,8 @@ HISTORY_MOST = 1000  # versions
 HELD_MOST = 4  # versions whose facts are held
 
 Properties = Mapping[str, Any]
+Area = GridBox | DegreeBox
+Bounds = tuple[float, float, float, float]  # west, south, east, north in degrees
 
 
 @dataclass(frozen=True)
@@ -45,8 +48,9 @@ class MapFacts:
 class FactsOfMap:
     """The facts of the versions that were asked for last, and the newest versions' summaries."""
 
-    def __init__(self, source: FeatureSource) -> None:
+    def __init__(self, source: FeatureSource, recorded: Mapping[str, Bounds]) -> None:
         self._source = source
+        self.recorded = recorded  # bounds of images, where they are known and need not be told from labels
         self._held: OrderedDict[int, MapFacts] = OrderedDict()
         self._history: tuple[int, tuple[VersionSummary, ...]] = (0, ())
         self._gains: MapGains | None = None
@@ -68,7 +72,12 @@ class FactsOfMap:
         return held
 
     async def landmarks(
-        self, state: MapState, as_of: int, *, area: GridBox | None = None, condition: Condition | None = None
+        self,
+        state: MapState,
+        as_of: int,
+        *,
+        area: Area | None = None,
+        condition: Condition | None = None,
     ) -> list[KnownLandmark]:
         """The landmarks of a version in an area that meet a condition. Raises DatabaseUnavailable."""
         found = await self._features(state, LANDMARKS, as_of, area=area, condition=condition)
@@ -82,13 +91,22 @@ class FactsOfMap:
 
     async def _looked_for(self, state: MapState, facts: MapFacts) -> Mapping[str, Sequence[str]]:
         found: dict[str, list[str]] = {}
-        for image, ground in facts.footprints.items():
-            west, south, east, north = ground.ground.bounds
-            area = GridBox(easting_min_m=west, northing_min_m=south, easting_max_m=east, northing_max_m=north)
-            for one in await self.landmarks(state, facts.map_version, area=area):
-                if ground.holds(one.grid_m):
-                    found.setdefault(one.landmark, []).append(image)
+        for image in sorted({*facts.footprints, *self.recorded}):
+            for one in await self._on_ground(image, state, facts):
+                found.setdefault(one.landmark, []).append(image)
         return found
+
+    async def _on_ground(self, image: str, state: MapState, facts: MapFacts) -> list[KnownLandmark]:
+        """The landmarks on an image's ground."""
+        if image in self.recorded:
+            west, south, east, north = self.recorded[image]
+            shown = DegreeBox(lon_min_deg=west, lat_min_deg=south, lon_max_deg=east, lat_max_deg=north)
+            return await self.landmarks(state, facts.map_version, area=shown)
+        ground = facts.footprints[image]
+        west, south, east, north = ground.ground.bounds
+        area = GridBox(easting_min_m=west, northing_min_m=south, easting_max_m=east, northing_max_m=north)
+        near = await self.landmarks(state, facts.map_version, area=area)
+        return [one for one in near if ground.holds(one.grid_m)]
 
     async def _looked_up(self, state: MapState, as_of: int) -> MapFacts:
         anchors = await self._features(state, ANCHORS, as_of)
@@ -115,7 +133,7 @@ class FactsOfMap:
         layer: Layer,
         as_of: int,
         *,
-        area: GridBox | None = None,
+        area: Area | None = None,
         condition: Condition | None = None,
     ) -> list[Any]:
         """All features of a layer, page by page."""

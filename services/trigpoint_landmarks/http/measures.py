@@ -46,7 +46,7 @@ def _pattern(template: str) -> str:
 def _of_part(part: str) -> str:
     if not part.startswith("{"):
         return re.escape(part)
-    return ".+" if part.endswith(":path}") else "[^/]+"
+    return ".*" if part.endswith(":path}") else "[^/]+"
 
 
 def _plain(template: str) -> str:

@@ -38,6 +38,14 @@ class RasterSettings:
     ending: Literal["png", "jpg", "webp"] = "png"
     images: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        west, south, east, north = self.bounds
+        if west >= east or south >= north or self.minzoom > self.maxzoom:
+            raise InputError(
+                f"raster {self.name}: bounds {west:g}, {south:g}, {east:g}, {north:g} and zoom {self.minzoom} to "
+                f"{self.maxzoom}: west, south, east, north and from the least zoom to the most are needed"
+            )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WebSettings:

@@ -5,6 +5,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from shapely.geometry import Point, shape
@@ -14,6 +15,7 @@ from map_http.asking import Api, asked_api, problem
 from map_http.corrections import MemoryCorrections
 from map_http.measured import FIXES, STEPS, MemoryDrives
 from map_http.sources import filled_source
+from trigpoint.errors import InputError
 from trigpoint.landmarks.model import MapChange
 from trigpoint_landmarks.http.settings import RasterSettings, WebSettings
 
@@ -128,10 +130,10 @@ def test_suggestions_are_in_order_of_what_they_would_tell(api: Api) -> None:
     found = api.told("/anchor-suggestions", sigma_m=0.1, image_sigma_m=0.35)
     assert [one["landmark"] for one in found["suggestions"]] == ["L1", "L0"]  # the others are labelled already
     first = found["suggestions"][0]
-    assert first["variance_reduction_m2"] == pytest.approx(0.3 / (0.04 + 0.01 + 0.35**2))
+    assert first["variance_reduction_m2"] == pytest.approx(0.3 / (0.04 + 0.01))  # in tile-1, whose offset is known
     assert found["summed_variance_m2"] == pytest.approx(5 * 0.08)
     assert first["share"] == pytest.approx(first["variance_reduction_m2"] / 0.4)
-    assert (first["rank"], first["kind"], first["image"], first["image_choices"]) == (1, "pole", "", [])
+    assert (first["rank"], first["kind"], first["image"], first["image_choices"]) == (1, "pole", "tile-1", ["tile-1"])
     assert "map version 2" in found["method"]
 
 
@@ -221,6 +223,12 @@ def test_rasters_are_listed_and_their_tiles_served(api: Api) -> None:
 )
 def test_nothing_but_a_raster_s_tiles_is_served(api: Api, path: str) -> None:
     assert problem(api.get(path))["status"] == 404
+
+
+@pytest.mark.parametrize("wrong", [{"bounds": (151.5, -34.0, 151.0, -33.5)}, {"minzoom": 9, "maxzoom": 8}])
+def test_a_raster_that_is_nowhere_is_refused(tmp_path: Path, wrong: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match="raster air: bounds"):
+        RasterSettings(**{"name": "air", "folder": tmp_path, "bounds": (151.0, -34.0, 151.5, -33.5), **wrong})
 
 
 def test_a_link_does_not_lead_out_of_a_raster_s_folder(api: Api) -> None:
