@@ -19,7 +19,6 @@ const token = tokenForm(store, () => void begin());
 const title = el("h1", {}, "trigpoint", el("small", {}, "viewer"));
 const root = document.getElementById("viewer") ?? document.body;
 const places = frame(root, [title, statusBar(store, speech), speech.element]);
-const view = new MapView(places.canvas, api);
 let viewer: Viewer | null = null;
 let beginning = false;
 
@@ -50,10 +49,10 @@ async function open(): Promise<void> {
   }
   store.set({ versions, shown: version, crs: landmarks.storageCrs, trouble: "" });
   const box = landmarks.extent.spatial?.bbox[0] ?? WORLD;
-  const drawn = view.open(box, version);
+  const view = new MapView(places.canvas, api, box, version);
   viewer = new Viewer(api, store, view, speech, places, token);
   const refreshed = viewer.refresh();
-  await drawn;
+  await view.drawn;
   performance.mark("first-picture");
   places.canvas.dataset.drawn = "true";
   await refreshed;

@@ -18,15 +18,7 @@ import type { Drawn, UncertainPoint } from "./features.ts";
 import { drawIcons } from "./icons.ts";
 import { LAYER_GROUPS } from "./layerGroups.ts";
 import { palette } from "./palette.ts";
-import {
-  dataLayers,
-  type FeatureSource,
-  groundStyle,
-  rasterSource,
-  shownLayers,
-  sources,
-  TILE_SOURCES,
-} from "./style.ts";
+import { dataLayers, type FeatureSource, rasterSource, styleOf, TILE_SOURCES } from "./style.ts";
 
 const REACH_PX = 8; // from what is pointed at
 const CLOSE_ZOOM = 20;
@@ -45,18 +37,22 @@ prewarm();
 export class MapView {
   readonly map: MapLibre;
   private readonly raised = new Map<FeatureSource, Drawn>();
-  private readonly styled: Promise<unknown>;
-  private version = 0;
+  /** Done when the first picture is there: landmarks and paths, with what `draw` was given coming after them. */
+  readonly drawn: Promise<void>;
   private opened = false;
 
-  /** A map without anything on it: the browser prepares to draw while the service is asked. */
+  /** A version in a box. */
   constructor(
     container: HTMLElement,
     private readonly api: MapApi,
+    box: Box,
+    private version: number,
   ) {
     this.map = new MapLibre({
       container,
-      style: groundStyle(palette()),
+      style: styleOf(palette(), (layer) => api.tiles(layer, version)),
+      bounds: box,
+      fitBoundsOptions: { padding: AROUND_PX, maxZoom: CLOSE_ZOOM },
       maxZoom: 24,
       attributionControl: false,
       dragRotate: false,
@@ -70,21 +66,8 @@ export class MapView {
     this.map.keyboard.disableRotation();
     this.map.addControl(new NavigationControl({ showCompass: false }), "top-right");
     this.map.addControl(new ScaleControl({ maxWidth: 120 }), "bottom-left");
-    this.styled = this.map.once("style.load");
+    this.drawn = this.open();
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.recolour());
-  }
-
-  /** Shows a version in a box; done when it is drawn: landmarks and paths, then all that `draw` was given. */
-  async open(box: Box, version: number): Promise<void> {
-    await this.styled;
-    this.version = version;
-    this.map.fitBounds(box, { padding: AROUND_PX, maxZoom: CLOSE_ZOOM, animate: false });
-    for (const [id, source] of sources((layer) => this.api.tiles(layer, version))) this.map.addSource(id, source);
-    drawIcons(this.map, palette());
-    for (const layer of shownLayers(palette())) this.map.addLayer(layer);
-    await this.map.once("idle");
-    this.opened = true;
-    for (const [source, features] of this.raised) this.draw(source, features);
   }
 
   /** Called when the view has come to rest, or other landmarks are there. */
@@ -167,6 +150,14 @@ export class MapView {
   /** Goes to a place; near enough to see single landmarks where `close`. */
   goTo(position: LonLat, close = true): void {
     this.map.easeTo({ center: position, zoom: close ? Math.max(this.map.getZoom(), CLOSE_ZOOM) : this.map.getZoom() });
+  }
+
+  /** Every kind of layer costs its shaders: what is not in the first picture waits for it. */
+  private async open(): Promise<void> {
+    await this.map.once("load");
+    this.opened = true;
+    drawIcons(this.map, palette());
+    for (const [source, features] of this.raised) this.draw(source, features);
   }
 
   private recolour(): void {

@@ -169,23 +169,18 @@ function hidden(one: LayerSpecification): LayerSpecification {
   return { ...one, layout: { ...one.layout, visibility: "none" } } as LayerSpecification;
 }
 
-/** The layers, each shown or hidden as its group is in the beginning. */
-export function shownLayers(colours: Palette): LayerSpecification[] {
-  return dataLayers(colours).map(hidden);
-}
-
-/** The style without any data. */
-export function groundStyle(colours: Palette): StyleSpecification {
+/** The style of the beginning, each layer shown or hidden as its group is; `tiles`: the template of a layer's tiles. */
+export function styleOf(colours: Palette, tiles: (layer: string) => string): StyleSpecification {
   const ground: LayerSpecification = {
     type: "background",
     id: "ground",
     paint: { "background-color": colours.ground },
   };
-  return { version: 8, sources: {}, layers: [ground] };
+  const layers = [ground, ...dataLayers(colours).map(hidden)];
+  return { version: 8, sources: Object.fromEntries(sources(tiles)), layers };
 }
 
-/** Every source by its name; `tiles` gives the template of a layer's tiles. */
-export function sources(tiles: (layer: string) => string): [string, SourceSpecification][] {
+function sources(tiles: (layer: string) => string): [string, SourceSpecification][] {
   const tiled = TILE_SOURCES.map((name): [string, SourceSpecification] => [
     name,
     { type: "vector", tiles: [tiles(name)], maxzoom: DEEPEST_ZOOM },
