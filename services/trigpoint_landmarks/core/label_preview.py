@@ -106,6 +106,16 @@ class LabelPreview:
     chi_square_limit: float | None = None
 
 
+def with_waiting(anchors: Sequence[KnownAnchor], waiting: Sequence[KnownAnchor]) -> tuple[KnownAnchor, ...]:
+    """The map's labels and those that wait for its next version; of one that was moved since, where it lies now."""
+    by_name = {(one.anchor, one.image): one for one in anchors}
+    for one in waiting:
+        known = by_name.get((one.anchor, one.image))
+        tied = one if known is None else replace(known, grid_m=one.grid_m, sigma_m=one.sigma_m)
+        by_name[one.anchor, one.image] = tied
+    return tuple(by_name.values())
+
+
 def previewed(label: ProspectiveLabel, around: MapAround, rule: AnchoringRule) -> LabelPreview:
     """What would become of a label."""
     anchors = [one for one in around.anchors if (one.anchor, one.image) != (label.anchor, label.image)]

@@ -1,6 +1,6 @@
 """What would become of a label, where the next one would help most, and which ground the images show."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,6 +16,7 @@ from trigpoint_landmarks.core.footprints import Footprint
 from trigpoint_landmarks.core.label_gains import NO_IMAGE, LabelSigmas, Suggestion
 from trigpoint_landmarks.core.label_preview import (
     AnchoringRule,
+    KnownAnchor,
     KnownLandmark,
     LabelPreview,
     MapAround,
@@ -23,10 +24,12 @@ from trigpoint_landmarks.core.label_preview import (
     ProspectiveLabel,
     expected_place,
     previewed,
+    with_waiting,
 )
 from trigpoint_landmarks.http.asked import Asked
 from trigpoint_landmarks.http.documents import JsonObject
 from trigpoint_landmarks.http.map_facts import Bounds, FactsOfMap, MapFacts
+from trigpoint_landmarks.http.ports import LabelRow
 
 REACHES_M = (40.0, 400.0, 4000.0)  # within which landmarks are looked for, one after the other
 SIGMA_M, IMAGE_SIGMA_M = 0.10, 0.35  # what is usual
@@ -50,27 +53,33 @@ class AnchorAdvice:
     """Advice from what is known of a map version."""
 
     facts: FactsOfMap
+    in_force: Callable[[], Awaitable[Sequence[LabelRow]]]  # the labels in the log
 
     async def association(self, asked: Asked, state: MapState, as_of: int) -> JsonObject:
-        """What the next solve would do with a label. Raises InputError, DatabaseUnavailable."""
+        """What the next solve would do with a label; on the newest version beside the labels that wait for the next.
+
+        Raises InputError, DatabaseUnavailable, ServiceError.
+        """
         label, sigmas = _label_of(asked, state)
         facts = await self.facts.of(state, as_of)
         if facts.rule is None:
             found = LabelPreview(is_tied=False, reason=f"map version {as_of} does not say how its labels were tied")
         else:
-            found = await self._previewed(label, facts, facts.rule, state)
+            rows = await self.in_force() if as_of == state.newest else ()
+            anchors = with_waiting(facts.anchors, _on_grid(rows, state.crs))
+            around = MapAround(landmarks=(), anchors=anchors, images=facts.known_images)
+            found = await self._previewed(label, around, facts.rule, (state, as_of))
         return _told(found, facts, label, sigmas)
 
     async def _previewed(
-        self, label: ProspectiveLabel, facts: MapFacts, rule: AnchoringRule, state: MapState
+        self, label: ProspectiveLabel, around: MapAround, rule: AnchoringRule, at: tuple[MapState, int]
     ) -> LabelPreview:
         """The preview from all landmarks that can matter: the reach grows until it holds the nearest and the gate."""
-        place = expected_place(label, facts.known_images, rule)
-        around = MapAround(landmarks=(), anchors=facts.anchors, images=facts.known_images)
+        place = expected_place(label, around.images, rule)
         found = LabelPreview(is_tied=False, reason="")
         for reach_m in REACHES_M:
-            landmarks = await self._around(place, reach_m, facts, state, label)
-            found = previewed(label, MapAround(landmarks=landmarks, anchors=around.anchors, images=around.images), rule)
+            landmarks = await self._around(place, reach_m, at, label)
+            found = previewed(label, replace(around, landmarks=landmarks), rule)
             if found.corrected_m is not None and max(found.corrected_m, found.gate_m or 0.0) <= reach_m:
                 return found
             if found.reason == "signature":
@@ -78,7 +87,7 @@ class AnchorAdvice:
         return found if found.nearest else replace(found, reason=f"no landmark within {REACHES_M[-1]:g} m")
 
     async def _around(
-        self, place: Point, reach_m: float, facts: MapFacts, state: MapState, label: ProspectiveLabel
+        self, place: Point, reach_m: float, at: tuple[MapState, int], label: ProspectiveLabel
     ) -> list[KnownLandmark]:
         """The landmarks near a place, and those of the label's identity."""
         area = GridBox(
@@ -87,12 +96,13 @@ class AnchorAdvice:
             easting_max_m=place[0] + reach_m,
             northing_max_m=place[1] + reach_m,
         )
-        found = await self.facts.landmarks(state, facts.map_version, area=area)
+        state, as_of = at
+        found = await self.facts.landmarks(state, as_of, area=area)
         if not label.signature:
             return found
         named = Compared("=", OfFeature(SIGNATURE_OF_LANDMARK), Given(label.signature))
         there = {one.landmark for one in found}
-        same = await self.facts.landmarks(state, facts.map_version, condition=named)
+        same = await self.facts.landmarks(state, as_of, condition=named)
         return [*found, *(one for one in same if one.landmark not in there)]
 
     async def suggestions(self, asked: Asked, state: MapState, as_of: int) -> JsonObject:
@@ -150,6 +160,19 @@ def _label_of(asked: Asked, state: MapState) -> tuple[ProspectiveLabel, LabelSig
         signature=asked.text("signature", limit=TEXT_LIMIT),
     )
     return label, sigmas
+
+
+def _on_grid(rows: Sequence[LabelRow], crs: str) -> list[KnownAnchor]:
+    """Labels of the log, tied to nothing yet."""
+    if not rows:
+        return []
+    lon_deg, lat_deg = (np.array([getattr(one, name) for one in rows]) for name in ("lon_deg", "lat_deg"))
+    easting_m, northing_m = transform_coordinates(lon_deg, lat_deg, source_crs=WGS84, target_crs=crs)
+    places = zip(rows, easting_m.tolist(), northing_m.tolist(), strict=True)
+    return [
+        KnownAnchor(anchor=one.anchor, image=one.image, grid_m=(x, y), sigma_m=one.sigma_m, landmark="", reason="")
+        for one, x, y in places
+    ]
 
 
 def _sigmas_of(asked: Asked) -> LabelSigmas:

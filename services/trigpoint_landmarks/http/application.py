@@ -279,11 +279,12 @@ def _map_api(settings: WebSettings, served: Served, instruments: Instruments, *,
 
 
 def _viewer_api(settings: WebSettings, served: Served, facts: FactsOfMap) -> ViewerApi:
+    drives = LoggedDrives(served.drives, served.corrections)
     return ViewerApi(
         settings=settings,
         watch=served.watch,
-        advice=AnchorAdvice(facts),
-        drives=LoggedDrives(served.drives, served.corrections),
+        advice=AnchorAdvice(facts, drives.in_force),
+        drives=drives,
         rasters=Rasters({one.name: one for one in settings.rasters}),
         can_write=served.corrections is not None,
     )

@@ -17,11 +17,12 @@ from trigpoint.landmarks.layers import drive_id
 from trigpoint_landmarks.core.thinning import spread, thinned
 from trigpoint_landmarks.http.asked import Asked
 from trigpoint_landmarks.http.documents import GEOJSON, JsonObject
-from trigpoint_landmarks.http.ports import DrivenPath, JudgedFix, MapCorrections, MeasuredDrives, PathSource
+from trigpoint_landmarks.http.ports import DrivenPath, JudgedFix, LabelRow, MapCorrections, MeasuredDrives, PathSource
 
 VERTICES_MOST = 2000  # of a drive's path
 FIXES_MOST = 5000
 FRESH_S = 5.0  # how long what was read of the log is shown again at least
+LABELS_S = 1.0  # labels are asked for with every step of a pointer
 READING_SHARE = 20.0  # and so many times as long as reading it took
 DEGREE_DECIMALS = 9
 SOURCES: tuple[PathSource, ...] = ("odometry", "filtered")
@@ -42,6 +43,7 @@ class LoggedDrives:
     ) -> None:
         self._drives, self._corrections, self._now_s = drives, corrections, now_s
         self._one_at_a_time = asyncio.Lock()
+        self._labels: tuple[float, Sequence[LabelRow]] = (float("-inf"), ())  # until when, and which
         self._held: dict[Hashable, tuple[float, Any]] = {}  # until when, and what
 
     async def paths(self, asked: Asked, map_version: int | None) -> Response:
@@ -69,12 +71,22 @@ class LoggedDrives:
         counts = {"map_version": map_version, "numberMatched": len(chosen), "numberReturned": len(shown)}
         return _collection([_fix_feature(one) for one in shown], counts)
 
-    async def labels(self) -> JsonObject:
-        """The labels in force. Raises ServiceError."""
+    async def in_force(self) -> Sequence[LabelRow]:
+        """The labels in force as they were `LABELS_S` ago at most. Raises ServiceError."""
+        if self._now_s() >= self._labels[0]:
+            await self._look_for_labels()
+        return self._labels[1]
+
+    async def _look_for_labels(self) -> None:
         corrections = self._corrections
-        rows = [] if corrections is None else await asyncio.to_thread(corrections.labels)
+        rows = () if corrections is None else await asyncio.to_thread(corrections.labels)
+        self._labels = (self._now_s() + LABELS_S, rows)
+
+    async def labels(self) -> JsonObject:
+        """The labels in force now. Raises ServiceError."""
+        await self._look_for_labels()
         told = []
-        for one in rows:
+        for one in self._labels[1]:
             values = asdict(one)
             position = [values.pop("lon_deg"), values.pop("lat_deg")]
             told.append({**values, "position": position})

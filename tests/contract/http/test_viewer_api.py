@@ -17,6 +17,7 @@ from map_http.measured import FIXES, STEPS, MemoryDrives
 from map_http.sources import filled_source
 from trigpoint.errors import InputError
 from trigpoint.landmarks.model import MapChange
+from trigpoint_landmarks.http.ports import NewLabel
 from trigpoint_landmarks.http.settings import RasterSettings, WebSettings
 
 PIXEL = b"\x89PNG of the ground"
@@ -88,6 +89,31 @@ def test_a_label_that_is_moved_does_not_stand_in_its_own_way(api: Api) -> None:
     assert api.told("/association", **place)["landmark"] == ""
     moved = api.told("/association", **place, anchor="a0")
     assert (moved["landmark"], moved["already_anchored_by"]) == ("L2", ["a0@tile-1"])
+
+
+def test_a_label_that_waits_for_the_next_version_counts_already(api: Api) -> None:
+    lat_deg, lon_deg = degrees(-0.3, 0.0)
+    label = NewLabel(
+        anchor="waits",
+        image="",
+        lat_deg=lat_deg,
+        lon_deg=lon_deg,
+        sigma_m=0.1,
+        image_sigma_m=0.0,
+        kind="pole",
+        signature="",
+    )
+    assert isinstance(api.corrections, MemoryCorrections)
+    api.corrections.label(label)
+    assert [one["anchor"] for one in api.told("/labels")["labels"]] == ["waits"]
+    try:
+        found = api.told("/association", **label_at(-0.5, 0.0))
+        before = api.told("/association", **label_at(-0.5, 0.0), as_of=1)
+    finally:
+        api.corrections.retract("waits", image=None, author="ann", reason="")
+        assert api.told("/labels") == {"labels": []}
+    assert (found["landmark"], found["reason"]) == ("", "another label is nearer to the landmark")
+    assert before["reason"].startswith("no anchor is tied yet")
 
 
 def test_before_the_first_anchor_is_tied_it_says_how_many_it_takes(api: Api) -> None:
