@@ -68,7 +68,7 @@ export function imageAt(images: readonly AerialImage[], position: LonLat): strin
   const shown = images.map(({ image, footprint }) => ({ image, ring: (footprint?.coordinates[0] ?? []) as LonLat[] }));
   const nearest = (ring: LonLat[]) => Math.min(...ring.map((corner) => distanceM(corner, position)));
   const held = shown.find(({ ring }) => holds(ring, position));
-  const found = held ?? shown.toSorted((one, other) => nearest(one.ring) - nearest(other.ring))[0];
+  const found = held ?? [...shown].sort((one, other) => nearest(one.ring) - nearest(other.ring))[0];
   return found?.image ?? "";
 }
 
