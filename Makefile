@@ -4,10 +4,13 @@ BIN := .venv/bin
 INSTALLED := .venv/.installed
 DEVELOPED := .venv/.developed
 CONSTRAINTS := constraints.txt
+VIEWER := services/trigpoint_landmarks/viewer
+VIEWER_PACKAGES := $(VIEWER)/node_modules/.package-lock.json
+VIEWER_BUILT := $(VIEWER)/dist/index.html
 PYTEST := $(BIN)/pytest $(if $(CI),--forbid-skipped=postgis --forbid-skipped=browser)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all check format-check lint types contracts format figures schemas readme system-tools clean
+.PHONY: help demo viewer viewer-where-possible test test-all check format-check lint types contracts format figures schemas readme system-tools clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14
@@ -16,10 +19,12 @@ demo: $(INSTALLED) ## a simulated campus from raw logs to a georeferenced map, w
 	$(BIN)/trigpoint demo --out demo
 	@echo "report: $(CURDIR)/demo/report.html"
 
-test: $(DEVELOPED) system-tools ## all tests except the slow ones
+viewer: $(VIEWER_BUILT) ## the page at /viewer/ of the HTTP service, built by npm
+
+test: $(DEVELOPED) system-tools viewer-where-possible ## all tests except the slow ones
 	$(PYTEST) -m "not slow"
 
-test-all: $(DEVELOPED) system-tools ## all tests
+test-all: $(DEVELOPED) system-tools viewer-where-possible ## all tests
 	$(PYTEST)
 
 check: format-check lint types contracts test ## format, lint, types, import contracts, tests and wheel
@@ -52,6 +57,17 @@ readme: $(DEVELOPED) ## README's data-flow diagram from the table
 system-tools:
 	@bash .ci/system-tools
 
+viewer-where-possible: system-tools
+	@if command -v npm >/dev/null; then $(MAKE) --no-print-directory viewer; \
+	else echo "npm is not installed: the viewer is not built, and its tests are skipped" >&2; fi
+
+$(VIEWER_PACKAGES): $(VIEWER)/package.json $(VIEWER)/package-lock.json
+	npm --prefix $(VIEWER) ci --no-audit --no-fund
+	@touch $@
+
+$(VIEWER_BUILT): $(VIEWER_PACKAGES) $(wildcard $(addprefix $(VIEWER)/,*.html *.ts tsconfig.json src/* src/*/*))
+	npm --prefix $(VIEWER) run build
+
 $(INSTALLED): pyproject.toml $(CONSTRAINTS)
 	@bash .ci/environment "$(PYTHON)"
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint $(CONSTRAINTS) --editable '.[services]'
@@ -62,4 +78,4 @@ $(DEVELOPED): $(INSTALLED)
 	@touch $@
 
 clean: ## what the other targets made
-	rm -rf .venv build dist demo .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
+	rm -rf .venv build dist demo $(VIEWER)/dist $(VIEWER)/node_modules .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis

@@ -54,6 +54,11 @@ class DataDirectory:
         return self.path / "truth" / "truth.csv"
 
     @property
+    def aerial(self) -> Path:
+        """A simulation's aerial pictures, a folder of tiles each."""
+        return self.path / "aerial"
+
+    @property
     def solves(self) -> Path:
         """What builds kept so that measuring them needs no second solve."""
         return self.path / "solves"

@@ -20,10 +20,12 @@ from trigpoint_evaluation.app import TruthEvaluation
 from trigpoint_ingest.anchor_files import read_anchor_file
 from trigpoint_ingest.anchors import import_anchors
 from trigpoint_ingest.core.tally import IngestReport
+from trigpoint_vehicle.aerial_files import write_viewer_configuration
 from trigpoint_vehicle.app import record_campus
 from trigpoint_vehicle.settings import SimulationSettings
 
 MARK = "trigpoint-demo"  # a file that says: this directory may be made anew
+VIEWER = "viewer.toml"  # a configuration of the HTTP service
 DEFAULT_OUT = Path("trigpoint-demo")
 
 
@@ -39,8 +41,9 @@ class _Driven:
 @click.option("--seed", type=int, default=1, show_default=True, metavar="N", help="Which campus.")
 @click.option("--vehicles", type=int, default=2, show_default=True, metavar="N", help="How many drive there.")
 @click.option("--known-signatures", is_flag=True, help="Detections and labels say which landmark they are of.")
+@click.option("--aerial", is_flag=True, help=f"Aerial pictures of it too, and DIR/{VIEWER}, which shows them.")
 @answering
-def command(out: Path, seed: int, vehicles: int, known_signatures: bool, *, screen: Screen) -> Answer:
+def command(out: Path, seed: int, vehicles: int, known_signatures: bool, aerial: bool, *, screen: Screen) -> Answer:
     """Simulate a campus and take it all the way to a map, a report and its errors.
 
     The vehicles' messages travel over Zenoh. DIR is a data directory afterwards: every other command works on it.
@@ -48,7 +51,7 @@ def command(out: Path, seed: int, vehicles: int, known_signatures: bool, *, scre
     settings = SimulationSettings(seed=seed, vehicles=vehicles, known_signatures=known_signatures)
     data = _emptied(out)
     screen.note(f"simulating campus {seed} with {vehicles} vehicles")
-    logs = _simulated(settings, data)
+    logs = _simulated(settings, data, aerial=aerial)
     with data.new_log() as log:
         with screen.counting("driving, over Zenoh", unit="messages") as progress:
             ingested = ingest_live(logs, log, progress)
@@ -86,10 +89,10 @@ def _emptied(out: Path) -> DataDirectory:
     if out.is_dir() and any(out.iterdir()) and not mark.is_file():
         raise InputError(f"{out}: the directory is not empty and not a demonstration's; choose another --out")
     try:
-        for made in (data.log, data.vehicles, data.solves, data.truth.parent):
+        for made in (data.log, data.vehicles, data.solves, data.truth.parent, data.aerial):
             if os.path.lexists(made):
                 shutil.rmtree(made)
-        for file in (data.report, data.anchors, *out.glob(f"{data.database.name}*")):
+        for file in (data.report, data.anchors, out / VIEWER, *out.glob(f"{data.database.name}*")):
             file.unlink(missing_ok=True)
         out.mkdir(parents=True, exist_ok=True)
         mark.write_text("`trigpoint demo` made this directory and may make it anew.\n", encoding="utf-8")
@@ -98,9 +101,11 @@ def _emptied(out: Path) -> DataDirectory:
     return data
 
 
-def _simulated(settings: SimulationSettings, data: DataDirectory) -> tuple[Path, ...]:
+def _simulated(settings: SimulationSettings, data: DataDirectory, *, aerial: bool) -> tuple[Path, ...]:
     """The vehicles' logs of a simulated campus; its truth goes where no service looks."""
-    written = record_campus(settings, data.vehicles)
+    written = record_campus(settings, data.vehicles, aerial=data.aerial if aerial else None)
+    if aerial:
+        write_viewer_configuration(written.pictures, data.path, data.path / VIEWER)
     if written.truth is None or written.anchors is None:
         raise InputError(f"seed {settings.seed}: the simulation left no truth or no anchors")
     data.truth.parent.mkdir(parents=True, exist_ok=True)

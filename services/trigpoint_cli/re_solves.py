@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from trigpoint.anchoring.association import UNASSIGNED
+from trigpoint.anchoring.labels import image_shifts_m
 from trigpoint.events.solved import LabelReduction
 from trigpoint_evaluation.core.leave_out import held_out_of, held_out_residuals_m, linear_labels
 from trigpoint_evaluation.core.summary import ErrorSummary, summary_of
-from trigpoint_optimisation.core.anchoring import UNASSIGNED, image_shifts_m
 from trigpoint_optimisation.core.fleet import solved_state
 from trigpoint_optimisation.core.stages import Solved, full_graph
 

@@ -13,6 +13,7 @@ from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.mapped import (
     AnchorAssociated,
     ImageOffsetSolved,
+    LabelGainSolved,
     LandmarkSolved,
     MapSolved,
     TrajectorySolved,
@@ -29,7 +30,7 @@ from trigpoint_landmarks.core.versions import OpenVersion, SolvedVersion, refusa
 
 MAP_STREAM = STREAM_PATTERNS[MapSolved]
 LABEL_STREAM = STREAM_PATTERNS[AnchorLabelled]
-KINDS = (AnchorAssociated, ImageOffsetSolved, LandmarkSolved, MapSolved, TrajectorySolved)
+KINDS = (AnchorAssociated, ImageOffsetSolved, LabelGainSolved, LandmarkSolved, MapSolved, TrajectorySolved)
 BATCH_BYTES = 32 * 1024 * 1024  # of payloads, which take some times that while they become rows
 
 Inputs = tuple[tuple[str, int], ...]

@@ -2,5 +2,6 @@
 
 Reads: VehicleDescribed, WheelSpeedMeasured, WheelPairMeasured, ImuMeasured, GnssFixReceived, LandmarksDetected,
 MapFramePinned, AnchorLabelled, AnchorRetracted, DriveExcluded, DriveIncluded, FixJudged
-Writes: MapSolved, TrajectorySolved, LandmarkSolved, AnchorAssociated, ImageOffsetSolved, OdometryCorrected
+Writes: MapSolved, TrajectorySolved, LandmarkSolved, AnchorAssociated, ImageOffsetSolved, LabelGainSolved,
+OdometryCorrected
 """

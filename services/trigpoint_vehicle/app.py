@@ -1,7 +1,7 @@
 """Reads recorded data or simulates a campus, and writes vehicles' logs with truth and anchors beside them."""
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tqdm import tqdm
@@ -9,6 +9,8 @@ from tqdm import tqdm
 from trigpoint.errors import InputError
 from trigpoint.events.truth import truth_lines
 from trigpoint.logs.vehicle_log import write_vehicle_log
+from trigpoint_vehicle.aerial_files import PictureFolder, write_pictures
+from trigpoint_vehicle.core.aerial import aerial_pictures
 from trigpoint_vehicle.core.anchors_geojson import anchors_geojson
 from trigpoint_vehicle.core.campus import conversion_of, simulate_campus
 from trigpoint_vehicle.core.mrclam import BARCODES, LANDMARKS, RobotSources, mrclam, robot_files, robot_numbers
@@ -31,6 +33,7 @@ class Written:
     logs: tuple[Path, ...]
     truth: Path | None
     anchors: Path | None
+    pictures: tuple[PictureFolder, ...] = ()
 
 
 def read_source(folder: Path, name: str) -> SourceText:
@@ -109,8 +112,19 @@ def convert_table(manifest_path: Path, out_dir: Path, *, data_dir: Path | None =
     return write_conversion(converted_tables(manifest, text.text, sources), out_dir)
 
 
-def record_campus(settings: SimulationSettings, out_dir: Path) -> Written:
-    """The simulated campus of a seed as logs, truth and anchors. Raises InputError."""
+def record_campus(settings: SimulationSettings, out_dir: Path, *, aerial: Path | None = None) -> Written:
+    """The simulated campus of a seed as logs, truth and anchors, and with pictures of it in the folder `aerial`.
+
+    Raises InputError.
+    """
     with tqdm(total=settings.vehicles, desc="driving", unit="vehicle", disable=None) as bar:
         campus = simulate_campus(settings.seed, settings.campus(), progress=lambda done, total: bar.update())
-    return write_conversion(conversion_of(campus), out_dir)
+    written = write_conversion(conversion_of(campus), out_dir)
+    if aerial is None:
+        return written
+    pictures = aerial_pictures(campus, settings.campus(), seed=settings.seed)
+    count = len(campus.imagery.image)
+    return replace(
+        written,
+        pictures=write_pictures(tqdm(pictures, total=count, desc="drawing", unit="picture", disable=None), aerial),
+    )

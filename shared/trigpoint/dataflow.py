@@ -17,6 +17,7 @@ from trigpoint.events.keys import (
 from trigpoint.events.mapped import (
     AnchorAssociated,
     ImageOffsetSolved,
+    LabelGainSolved,
     LandmarkSolved,
     MapSolved,
     OdometryCorrected,
@@ -95,6 +96,7 @@ FLOWS: tuple[Flow, ...] = (
     Flow(LandmarkSolved, OPTIMISATION, (LANDMARKS, EVALUATION)),
     Flow(AnchorAssociated, OPTIMISATION, (LANDMARKS, EVALUATION)),
     Flow(ImageOffsetSolved, OPTIMISATION, (LANDMARKS, EVALUATION)),
+    Flow(LabelGainSolved, OPTIMISATION, (LANDMARKS,)),
     Flow(MapSolved, OPTIMISATION, (LANDMARKS, EVALUATION)),
     Flow(OdometryCorrected, OPTIMISATION, (VEHICLE,)),
 )

@@ -64,6 +64,14 @@ def test_nothing_but_packages_and_metadata_is_in_the_wheel(wheel: Path) -> None:
     assert tops == packages - {"__pycache__"}
 
 
+def test_of_the_viewer_the_wheel_has_what_was_built_and_no_more(wheel: Path) -> None:
+    folder = REPOSITORY / "services" / "trigpoint_landmarks" / "viewer"
+    built = {path.relative_to(folder).as_posix() for path in (folder / "dist").rglob("*") if path.is_file()}
+    prefix = "trigpoint_landmarks/viewer/"
+    names = zipfile.ZipFile(wheel).namelist()
+    assert {name.removeprefix(prefix) for name in names if name.startswith(prefix)} == built
+
+
 def test_the_command_of_the_installed_wheel_says_what_it_can_do(installed: Path) -> None:
     said = said_by(installed / "trigpoint", "--help", folder=installed)
     assert {"demo", "convert", "ingest", "build", "report"} <= set(said.split())

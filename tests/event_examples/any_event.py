@@ -14,6 +14,7 @@ from trigpoint.events.estimated import FixJudged, GateAlarmed, PoseFiltered
 from trigpoint.events.mapped import (
     AnchorAssociated,
     ImageOffsetSolved,
+    LabelGainSolved,
     LandmarkSolved,
     MapSolved,
     OdometryCorrected,
@@ -148,6 +149,16 @@ ANY_EVENT: dict[type, SearchStrategy[object]] = {
     ),
     ImageOffsetSolved: st.builds(
         ImageOffsetSolved, map_version=any_int, image=any_text, offset_m=_array(2), covariance_m2=_array(2, 2)
+    ),
+    LabelGainSolved: st.integers(0, 3).flatmap(
+        lambda count: st.builds(
+            LabelGainSolved,
+            map_version=any_int,
+            image=any_text,
+            landmarks=st.lists(any_text, min_size=count, max_size=count).map(tuple),
+            expected_m2=_array(count, 3),
+            shared_m4=_array(count, 3),
+        )
     ),
     OdometryCorrected: st.builds(
         OdometryCorrected,

@@ -11,6 +11,7 @@ from trigpoint.events.estimated import FixJudged, GateAlarmed, PoseFiltered
 from trigpoint.events.mapped import (
     AnchorAssociated,
     ImageOffsetSolved,
+    LabelGainSolved,
     LandmarkSolved,
     MapSolved,
     OdometryCorrected,
@@ -121,6 +122,13 @@ EVENTS: tuple[Event, ...] = (
     ),
     AnchorAssociated(map_version=3, anchor="a1", landmark="lm-7", reason="", residual_m=np.array([0.1, -0.2])),
     ImageOffsetSolved(map_version=3, image="west", offset_m=np.array([0.3, 0.1]), covariance_m2=np.diag([0.01, 0.02])),
+    LabelGainSolved(
+        map_version=3,
+        image="west",
+        landmarks=("lm-7", "lm-9"),
+        expected_m2=np.array([[0.05, 0.01, 0.11], [0.04, 0.0, 0.04]]),
+        shared_m4=np.array([[0.02, 0.001, 0.03], [0.01, 0.0, 0.01]]),
+    ),
     OdometryCorrected(
         vehicle="van",
         boot_id="boot-1",

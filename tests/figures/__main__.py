@@ -25,6 +25,7 @@ from figures import (
     security,
     security_fuzz,
     victoria_park,
+    viewer,
 )
 from figures.figure import Figure, json_line, measured_lines
 from figures.workbench import Workbench
@@ -46,6 +47,7 @@ GROUPS: Mapping[str, Sequence[Figure]] = {
     "live": live.FIGURES,
     "query": query.FIGURES,
     "http": http.FIGURES,
+    "viewer": viewer.FIGURES,
     "relocalise": relocalise.FIGURES,
     "security": (*security.FIGURES, *security_fuzz.FIGURES),
 }

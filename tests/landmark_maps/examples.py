@@ -10,6 +10,7 @@ from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.mapped import (
     AnchorAssociated,
     ImageOffsetSolved,
+    LabelGainSolved,
     LandmarkSolved,
     Mapped,
     MapSolved,
@@ -155,6 +156,14 @@ def image_offset(*, map_version: int = 1) -> ImageOffsetSolved:
     )
 
 
+def label_gain(landmarks: Sequence[str], *, map_version: int = 1) -> LabelGainSolved:
+    """What one more label in no known image would tell."""
+    terms = np.tile([0.04, 0.01, 0.09], (len(landmarks), 1))
+    return LabelGainSolved(
+        map_version=map_version, image="", landmarks=tuple(landmarks), expected_m2=terms, shared_m4=0.5 * terms
+    )
+
+
 def label(anchor: str, *, lat_deg: float = -33.89, lon_deg: float = 151.19) -> AnchorLabelled:
     return AnchorLabelled(
         anchor=anchor,
@@ -236,6 +245,7 @@ def pin_frame(log: EventLog) -> None:
 
 def whole_change(map_version: int = 1) -> MapChange:
     """A map version with something in every table, as the service makes it from events."""
-    events = solved_map(map_version, [solved_landmark("L1", 1.5, 2.5, map_version=map_version)], labels=1)
+    *parts, head = solved_map(map_version, [solved_landmark("L1", 1.5, 2.5, map_version=map_version)], labels=1)
+    events = [*parts, label_gain(["L1"], map_version=map_version), head]
     (version,) = solved_versions(logged(events))
     return map_change(version, frame=frame(), labels={("anchor-1", "tile-1"): label("anchor-1")}, valid={})

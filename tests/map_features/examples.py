@@ -1,11 +1,12 @@
 """A map of two versions with landmarks, paths, anchors and an image offset."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 
 from landmark_maps.examples import START_NS, change, landmark, version_row
-from trigpoint.landmarks.model import Anchor, ImageOffset, Landmark, MapChange, Trajectory
+from trigpoint.landmarks.model import Anchor, ImageOffset, LabelGain, Landmark, MapChange, Trajectory
 
 SIDE_M = 2000.0
 COUNT = 300
@@ -81,6 +82,12 @@ def offset(*, map_version: int = 1, x_m: float = 0.2) -> ImageOffset:
     )
 
 
+def gain(image: str, *landmarks: str) -> LabelGain:
+    """What one more label of each of these landmarks would tell, of the first less than of the next."""
+    terms = [[0.04, 0.0, 0.04, 0.1 * (row + 1), 0.0, 0.1] for row in range(len(landmarks))]
+    return LabelGain(map_version=1, image=image, landmarks_json=json.dumps(landmarks), terms_json=json.dumps(terms))
+
+
 def two_versions() -> tuple[MapChange, MapChange]:
     """A whole version, and one that moves every third landmark by 10 m to the north, and one of two paths."""
     rows = crowd()
@@ -90,6 +97,7 @@ def two_versions() -> tuple[MapChange, MapChange]:
         trajectories=(path("veh-a", map_version=1), path("veh-b", map_version=1, shift_m=50.0)),
         anchors=(anchor("a1"), anchor("a/2", image=""), anchor("a3", placed=False)),
         image_offsets=(offset(),),
+        label_gains=(gain("", rows[0].landmark, rows[1].landmark), gain("tile-1", rows[1].landmark)),
     )
     second = replace(
         change(2, opened=moved, closed=[row.landmark for row in moved]),

@@ -11,9 +11,10 @@ from typing import Any
 import httpx
 
 from trigpoint.landmarks.feature_query import FeatureSource
-from trigpoint_landmarks.http.application import application
+from trigpoint.observability.metrics import Instruments
+from trigpoint_landmarks.http.application import Served, application
 from trigpoint_landmarks.http.map_watch import MapWatch
-from trigpoint_landmarks.http.ports import MapCorrections
+from trigpoint_landmarks.http.ports import MapCorrections, MeasuredDrives
 from trigpoint_landmarks.http.settings import WebSettings
 from trigpoint_landmarks.http.tokens import Scope, issue_token
 
@@ -28,10 +29,11 @@ class Api:
     served: Any
     watch: MapWatch
     corrections: MapCorrections | None
+    instruments: Instruments
 
     def ask(self, method: str, path: str, **more: Any) -> httpx.Response:
         """The answer to one request."""
-        return self.runner.run(self._ask(method, path, **more))
+        return self.runner.run(self.asked(method, path, **more))
 
     def get(self, path: str, **more: Any) -> httpx.Response:
         """The answer to a GET."""
@@ -47,7 +49,8 @@ class Api:
         """The ids of a page's features."""
         return [feature["id"] for feature in self.told(path, **parameters)["features"]]
 
-    async def _ask(self, method: str, path: str, *, client: str = "127.0.0.1", **more: Any) -> httpx.Response:
+    async def asked(self, method: str, path: str, *, client: str = "127.0.0.1", **more: Any) -> httpx.Response:
+        """The answer to one request, in the event loop."""
         transport = httpx.ASGITransport(app=self.served, client=(client, 1234))
         async with httpx.AsyncClient(transport=transport, base_url=BASE_URL) as asking:
             return await asking.request(method, path, **more)
@@ -60,15 +63,17 @@ def asked_api(
     settings: WebSettings | None = None,
     *,
     corrections: MapCorrections | None = None,
+    drives: MeasuredDrives | None = None,
 ) -> Iterator[Api]:
     """The application on a source."""
     chosen = settings or WebSettings()
-    watch = MapWatch(source, look_s=chosen.look_s)
+    watch, instruments = MapWatch(source, look_s=chosen.look_s), Instruments("http")
 
     async def made() -> Any:
-        return application(chosen, source, watch, corrections)
+        served = Served(source=source, watch=watch, corrections=corrections, drives=drives)
+        return application(chosen, served, instruments)
 
-    yield Api(runner, runner.run(made()), watch, corrections)
+    yield Api(runner, runner.run(made()), watch, corrections, instruments)
     runner.run(source.close())
 
 

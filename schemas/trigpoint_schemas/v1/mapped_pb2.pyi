@@ -143,3 +143,17 @@ class ImageOffsetSolved(_message.Message):
     offset_m: _containers.RepeatedScalarFieldContainer[float]
     covariance_m2: _containers.RepeatedScalarFieldContainer[float]
     def __init__(self, map_version: _Optional[int] = ..., image: _Optional[str] = ..., offset_m: _Optional[_Iterable[float]] = ..., covariance_m2: _Optional[_Iterable[float]] = ...) -> None: ...
+
+class LabelGainSolved(_message.Message):
+    __slots__ = ("map_version", "image", "landmarks", "expected_m2", "shared_m4")
+    MAP_VERSION_FIELD_NUMBER: _ClassVar[int]
+    IMAGE_FIELD_NUMBER: _ClassVar[int]
+    LANDMARKS_FIELD_NUMBER: _ClassVar[int]
+    EXPECTED_M2_FIELD_NUMBER: _ClassVar[int]
+    SHARED_M4_FIELD_NUMBER: _ClassVar[int]
+    map_version: int
+    image: str
+    landmarks: _containers.RepeatedScalarFieldContainer[str]
+    expected_m2: _containers.RepeatedScalarFieldContainer[float]
+    shared_m4: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, map_version: _Optional[int] = ..., image: _Optional[str] = ..., landmarks: _Optional[_Iterable[str]] = ..., expected_m2: _Optional[_Iterable[float]] = ..., shared_m4: _Optional[_Iterable[float]] = ...) -> None: ...

@@ -4,11 +4,13 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import cast
 
 from trigpoint.errors import InputError
+from trigpoint.events.corrected import AnchorLabelled, Corrected, anchors_in_force
 from trigpoint.geodesy.projection import WGS84
 from trigpoint.logs.mcap_log import McapLog
-from trigpoint.logs.readings import logged_frame, pinned_frame
+from trigpoint.logs.readings import LABEL_STREAM, logged_frame, pinned_frame
 from trigpoint_cli.data_dir import DataDirectory
 from trigpoint_ingest.anchors import import_anchors
 from trigpoint_ingest.core.anchors import AnchorRow, LabelledAnchors, labelled, near_map
@@ -22,7 +24,7 @@ from trigpoint_ingest.corrections import (
     logged_drive_standings,
     retract_anchor,
 )
-from trigpoint_landmarks.http.ports import Appended, DriveRow, NewLabel, NoSuchName
+from trigpoint_landmarks.http.ports import Appended, DriveRow, LabelRow, NewLabel, NoSuchName
 
 
 class LoggedCorrections:
@@ -35,6 +37,14 @@ class LoggedCorrections:
         """Every drive in the log."""
         with self._data.new_log() as log:
             return [_drive_row(one) for one in logged_drive_standings(log)]
+
+    def labels(self) -> Sequence[LabelRow]:
+        """The labels in force."""
+        with self._data.new_log() as log:
+            rows = [(row.envelope.stamp_ns, cast(Corrected, row.envelope.event)) for row in log.read(LABEL_STREAM)]
+        labelled_ns = {id(event): stamp_ns for stamp_ns, event in rows}
+        in_force = anchors_in_force(event for _, event in rows)
+        return [_label_row(one, stamp_ns=labelled_ns[id(one)]) for one in in_force]
 
     def label(self, label: NewLabel) -> Appended:
         """The label in the log. One that is refused is not kept aside, as a file's is: whoever sent it is told."""
@@ -97,6 +107,20 @@ def _require_taken(found: LabelledAnchors) -> None:
     """Raises InputError for an anchor that was refused."""
     for one in found.refused:
         raise InputError(f"{one.reason}: {one.detail}")
+
+
+def _label_row(one: AnchorLabelled, *, stamp_ns: int) -> LabelRow:
+    return LabelRow(
+        anchor=one.anchor,
+        image=one.image,
+        lat_deg=one.lat_deg,
+        lon_deg=one.lon_deg,
+        sigma_m=one.sigma_m,
+        image_sigma_m=one.image_sigma_m,
+        kind=one.kind,
+        signature=one.signature,
+        stamp_ns=stamp_ns,
+    )
 
 
 def _drive_row(one: DriveStanding) -> DriveRow:

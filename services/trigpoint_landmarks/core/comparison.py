@@ -3,7 +3,16 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 
-from trigpoint.landmarks.model import Anchor, Checkpoint, ImageOffset, Landmark, MapRow, MapVersion, Trajectory
+from trigpoint.landmarks.model import (
+    Anchor,
+    Checkpoint,
+    ImageOffset,
+    LabelGain,
+    Landmark,
+    MapRow,
+    MapVersion,
+    Trajectory,
+)
 
 RowKey = tuple[str, str]
 
@@ -73,3 +82,5 @@ def _key(row: MapRow) -> RowKey:
             return "anchors", f"{row.anchor} in {row.image or 'the survey'} of version {row.map_version}"
         case ImageOffset():
             return "image_offsets", f"{row.image} of version {row.map_version}"
+        case LabelGain():
+            return "label_gains", f"{row.image or 'no image'} of version {row.map_version}"

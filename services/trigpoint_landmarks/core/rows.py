@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from trigpoint.events.corrected import AnchorLabelled, Corrected, anchors_in_force
 from trigpoint.events.envelope import LogPosition
-from trigpoint.events.mapped import AnchorAssociated, ImageOffsetSolved, TrajectorySolved
+from trigpoint.events.mapped import AnchorAssociated, ImageOffsetSolved, LabelGainSolved, TrajectorySolved
 from trigpoint.events.solved_landmarks import Observations, SolvedLandmarks
 from trigpoint.geodesy.positions import Wgs84Position
 from trigpoint.geodesy.projection import MapFrame, map_from_wgs84, wgs84_from_map_points
@@ -19,6 +19,7 @@ from trigpoint.geodesy.uncertainty import ellipses_of
 from trigpoint.landmarks.model import (
     Anchor,
     ImageOffset,
+    LabelGain,
     Landmark,
     MapChange,
     MapVersion,
@@ -63,6 +64,7 @@ def map_change(version: SolvedVersion, *, frame: MapFrame, labels: Labels, valid
         trajectories=tuple(_trajectory_row(row, frame) for row in version.trajectories),
         anchors=tuple(_anchor_row(row, _label_of(row, labels), frame) for row in version.anchors),
         image_offsets=tuple(_offset_row(row) for row in version.image_offsets),
+        label_gains=tuple(_gain_row(row) for row in version.label_gains),
     )
 
 
@@ -203,6 +205,18 @@ def _offset_row(row: ImageOffsetSolved) -> ImageOffset:
         variance_x_m2=float(row.covariance_m2[0, 0]),
         covariance_xy_m2=float(row.covariance_m2[0, 1]),
         variance_y_m2=float(row.covariance_m2[1, 1]),
+    )
+
+
+def _gain_row(row: LabelGainSolved) -> LabelGain:
+    """The gain of labels as a row; a landmark whose terms are not finite numbers says nothing."""
+    terms = np.column_stack([row.expected_m2, row.shared_m4])
+    finite = np.flatnonzero(np.isfinite(terms).all(axis=1))
+    return LabelGain(
+        map_version=row.map_version,
+        image=row.image,
+        landmarks_json=json.dumps([row.landmarks[number] for number in finite], ensure_ascii=False),
+        terms_json=json.dumps(terms[finite].tolist()),
     )
 
 

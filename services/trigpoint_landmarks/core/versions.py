@@ -12,6 +12,7 @@ from trigpoint.events.envelope import Envelope, LogPosition
 from trigpoint.events.mapped import (
     AnchorAssociated,
     ImageOffsetSolved,
+    LabelGainSolved,
     LandmarkSolved,
     Mapped,
     MapSolved,
@@ -23,7 +24,7 @@ from trigpoint.events.solved_landmarks import LandmarkDecoder, SolvedLandmarks
 
 HEAD_SCHEMA, LANDMARK_SCHEMA = schema_name(MapSolved), schema_name(LandmarkSolved)
 
-T = TypeVar("T", TrajectorySolved, AnchorAssociated, ImageOffsetSolved)
+T = TypeVar("T", TrajectorySolved, AnchorAssociated, ImageOffsetSolved, LabelGainSolved)
 Integers = NDArray[np.int64]
 
 
@@ -38,6 +39,7 @@ class SolvedVersion:
     trajectories: tuple[TrajectorySolved, ...]
     anchors: tuple[AnchorAssociated, ...]
     image_offsets: tuple[ImageOffsetSolved, ...]
+    label_gains: tuple[LabelGainSolved, ...] = ()
 
 
 class OpenVersion:
@@ -78,6 +80,7 @@ class OpenVersion:
             trajectories=tuple({(row.vehicle, row.boot_id): row for row in _of(others, TrajectorySolved)}.values()),
             anchors=tuple({(row.anchor, row.image): row for row in _of(others, AnchorAssociated)}.values()),
             image_offsets=tuple({row.image: row for row in _of(others, ImageOffsetSolved)}.values()),
+            label_gains=tuple({row.image: row for row in _of(others, LabelGainSolved)}.values()),
         )
 
     def _landmarks(self, runs: Sequence[EncodedRun], map_version: int) -> SolvedLandmarks:
@@ -120,6 +123,7 @@ def _texts(version: SolvedVersion) -> Iterator[str]:
     for anchor in version.anchors:
         yield from (anchor.anchor, anchor.image, anchor.landmark, anchor.reason)
     yield from (offset.image for offset in version.image_offsets)
+    yield from (gain.image for gain in version.label_gains)
     yield from (version.solved.method, version.solved.settings_json)
 
 

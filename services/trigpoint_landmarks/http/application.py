@@ -9,6 +9,7 @@ from typing import Any
 
 from fastapi import FastAPI
 from fastapi.exceptions import RequestValidationError
+from fastapi.routing import APIRoute
 from starlette.exceptions import HTTPException
 from starlette.middleware.cors import CORSMiddleware
 from starlette.requests import Request
@@ -17,20 +18,32 @@ from starlette.responses import Response
 from trigpoint.errors import TrigpointError
 from trigpoint.landmarks.feature_query import FeatureSource
 from trigpoint.landmarks.layers import LAYERS, Layer
+from trigpoint.observability.metrics import Instruments
 from trigpoint_landmarks.http import documents
 from trigpoint_landmarks.http.admission import Admission
+from trigpoint_landmarks.http.anchor_advice import AnchorAdvice
 from trigpoint_landmarks.http.asked import Asked, asked_of
 from trigpoint_landmarks.http.compression import accepts_gzip
 from trigpoint_landmarks.http.documents import JSON, OPENAPI_JSON, QUADS, SCHEMA_JSON, JsonObject
-from trigpoint_landmarks.http.front import Front
+from trigpoint_landmarks.http.driven import LoggedDrives
+from trigpoint_landmarks.http.event_stream import PATH as EVENTS_PATH
+from trigpoint_landmarks.http.event_stream import VersionFeed
+from trigpoint_landmarks.http.front import Beside, Front
 from trigpoint_landmarks.http.labelling import labelling_router
+from trigpoint_landmarks.http.map_facts import FactsOfMap
 from trigpoint_landmarks.http.map_watch import MapWatch
+from trigpoint_landmarks.http.measures import RequestMeasures
 from trigpoint_landmarks.http.openapi import api_document
 from trigpoint_landmarks.http.pages import Pages
-from trigpoint_landmarks.http.ports import MapCorrections
+from trigpoint_landmarks.http.ports import MapCorrections, MeasuredDrives
 from trigpoint_landmarks.http.problems import Problem, problem_of, problem_response
+from trigpoint_landmarks.http.rasters import Rasters
 from trigpoint_landmarks.http.settings import MEBIBYTE, WebSettings
 from trigpoint_landmarks.http.tiles import Held, Tiles, asked_version, tile_of, tiled_layer
+from trigpoint_landmarks.http.viewer_api import ViewerApi
+from trigpoint_landmarks.http.viewer_files import PREFIX as VIEWER_PREFIX
+
+VIEWER_FILES = f"{VIEWER_PREFIX}{{file:path}}"
 
 Handler = Callable[[Request], Awaitable[Response]]
 
@@ -43,6 +56,7 @@ class MapApi:
     watch: MapWatch
     pages: Pages
     tiles: Tiles
+    facts: FactsOfMap
     layers: tuple[Layer, ...]
     written: JsonObject
 
@@ -75,7 +89,9 @@ class MapApi:
     async def versions(self, request: Request) -> Response:
         """Every map version."""
         asked = self.asked(request)
-        return _json(asked, documents.versions_document(asked, await self.watch.current()))
+        state = await self.watch.current()
+        history = () if state is None else await self.facts.history(state)
+        return _json(asked, documents.versions_document(asked, state, history))
 
     async def api(self, request: Request) -> Response:
         """The API's definition."""
@@ -217,26 +233,69 @@ def corrections_definition() -> JsonObject:
     return described.openapi()
 
 
-def application(
-    settings: WebSettings, source: FeatureSource, watch: MapWatch, corrections: MapCorrections | None
-) -> Any:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Served:
+    """What is served: a database, what is known of it, and, where there is a log, what it holds and takes."""
+
+    source: FeatureSource
+    watch: MapWatch
+    corrections: MapCorrections | None = None
+    drives: MeasuredDrives | None = None
+
+
+def application(settings: WebSettings, served: Served, instruments: Instruments) -> Any:
     """The ASGI application. Raises InputError for a token file that cannot be read."""
     admission = Admission(settings)
     framework = FastAPI(openapi_url=None, docs_url=None, redoc_url=None, redirect_slashes=False)
-    framework.include_router(labelling_router(corrections))
-    api = MapApi(
-        settings=settings,
-        watch=watch,
-        pages=Pages(source, watch, None if corrections is None else corrections.drives),
-        tiles=Tiles(source, watch, cache_bytes=settings.tile_cache_mib * MEBIBYTE, public=admission.is_open),
-        layers=tuple(layer for layer in LAYERS.values() if layer.stored or corrections is not None),
-        written=corrections_definition(),
-    )
-    for path, handler in api.routes().items():
+    router = labelling_router(served.corrections)
+    framework.include_router(router)
+    api = _map_api(settings, served, instruments, public=admission.is_open)
+    routes = {**api.routes(), **_viewer_api(settings, served, api.facts).routes()}
+    for path, handler in routes.items():
         framework.add_route(path, handler, methods=["GET"], include_in_schema=False)
     for kind in (HTTPException, RequestValidationError, Problem, TrigpointError, Exception):
         framework.add_exception_handler(kind, _answer_problem)
-    front = Front(framework, api, admission, settings)
+    written = (route.path for route in router.routes if isinstance(route, APIRoute))
+    beside = Beside(
+        feed=VersionFeed(served.watch, instruments, limit=settings.listeners),
+        measures=RequestMeasures(instruments, (*routes, *written, EVENTS_PATH, VIEWER_FILES)),
+    )
+    return _with_origins(Front(framework, api, admission, settings, beside=beside), settings)
+
+
+def _map_api(settings: WebSettings, served: Served, instruments: Instruments, *, public: bool) -> MapApi:
+    source, watch, corrections = served.source, served.watch, served.corrections
+    return MapApi(
+        settings=settings,
+        watch=watch,
+        pages=Pages(source, watch, None if corrections is None else corrections.drives),
+        tiles=Tiles(
+            source,
+            watch,
+            cache_bytes=settings.tile_cache_mib * MEBIBYTE,
+            public=public,
+            instruments=instruments,
+        ),
+        facts=FactsOfMap(source, {image: one.bounds for one in settings.rasters for image in one.images}),
+        layers=tuple(layer for layer in LAYERS.values() if layer.stored or corrections is not None),
+        written=corrections_definition(),
+    )
+
+
+def _viewer_api(settings: WebSettings, served: Served, facts: FactsOfMap) -> ViewerApi:
+    drives = LoggedDrives(served.drives, served.corrections)
+    return ViewerApi(
+        settings=settings,
+        watch=served.watch,
+        advice=AnchorAdvice(facts, drives.in_force),
+        drives=drives,
+        rasters=Rasters({one.name: one for one in settings.rasters}),
+        can_write=served.corrections is not None,
+    )
+
+
+def _with_origins(front: Front, settings: WebSettings) -> Any:
+    """The application, for pages of other origins too where there are any."""
     if not settings.origins:
         return front
     return CORSMiddleware(

@@ -38,6 +38,25 @@ class Asked:
             raise InputError(f"{name} {text[:40]!r} is no whole number")
         return int(text)
 
+    def number(self, name: str, default: float | None = None, *, least: float, most: float) -> float:
+        """A number between two limits. Raises InputError for any other text, and where none is given nor usual."""
+        text = self.parameters.get(name)
+        if text is None:
+            if default is None:
+                raise InputError(f"{name} is needed: a number from {least:g} to {most:g}")
+            return default
+        (value,) = numbers_of(text, (1,), "a number")
+        if not least <= value <= most:
+            raise InputError(f"{name} {text[:40]} is outside {least:g} to {most:g}")
+        return value
+
+    def text(self, name: str, *, limit: int) -> str:
+        """A text, empty where none is given. Raises InputError for one that is too long."""
+        text = self.parameters.get(name, "")
+        if len(text) > limit:
+            raise InputError(f"{name} has {len(text)} characters: {limit} at most")
+        return text
+
     def url(self, path: str | None = None, /, **changed: object) -> str:
         """The address of a path, with parameters; of this request's own path where none is given, with its own too."""
         own = self.parameters if path is None else {}

@@ -1,13 +1,14 @@
 """The API's own documents: landing page, conformance, collections, queryables, tile sets; plain values for JSON."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import Any
 
 from trigpoint.geodesy.web_tiles import MERCATOR_LIMIT_DEG
 from trigpoint.landmarks.cql2_conditions import GEOMETRY
 from trigpoint.landmarks.feature_crs import CRS84_URI, offered_crs, storage_crs
-from trigpoint.landmarks.feature_query import MapState
+from trigpoint.landmarks.feature_query import MapState, VersionSummary
 from trigpoint.landmarks.layers import LANDMARKS, Layer, Property
 from trigpoint.landmarks.tile_grid import EXTENT, TILE_PROPERTIES, ZOOM_MOST
 from trigpoint_landmarks.http.asked import Asked
@@ -69,6 +70,7 @@ def landing_page(asked: Asked) -> JsonObject:
         "links": [
             link(asked.url("/"), "self", JSON, "This page"),
             link(asked.url("/", f="html"), "alternate", "text/html", "This page for people"),
+            link(asked.url("/viewer/"), "preview", "text/html", "The map, to look at and to label anchors in"),
             link(asked.url("/api"), "service-desc", OPENAPI_JSON, "The API's definition"),
             link(asked.url("/conformance"), "conformance", JSON, "What it conforms to"),
             link(asked.url("/collections"), "data", JSON, "The collections"),
@@ -83,12 +85,13 @@ def conformance() -> JsonObject:
     return {"conformsTo": list(CONFORMANCE)}
 
 
-def versions_document(asked: Asked, state: MapState | None) -> JsonObject:
-    """Every map version there is, the newest last."""
+def versions_document(asked: Asked, state: MapState | None, history: Sequence[VersionSummary]) -> JsonObject:
+    """Every map version there is, the newest last, and what is said of the newest of them."""
     return {
         "map_version": None if state is None else state.newest,
         "solved_ns": None if state is None else state.solved_ns,
         "versions": [] if state is None else list(state.versions),
+        "history": [asdict(one) for one in history],
         "links": [link(asked.url(), "self", JSON)],
     }
 

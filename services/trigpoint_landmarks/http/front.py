@@ -1,6 +1,8 @@
 """What every request passes first: admission, its body, the two busiest paths; and where every error ends."""
 
 import logging
+import time
+from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Any, Protocol
 
@@ -11,10 +13,15 @@ from trigpoint.landmarks.layers import Layer
 from trigpoint_landmarks.http.admission import Admission, Message, Receive, announced_size, require_size, whole_body
 from trigpoint_landmarks.http.asked import Asked, host_of
 from trigpoint_landmarks.http.compression import negotiated
+from trigpoint_landmarks.http.event_stream import PATH as EVENTS_PATH
+from trigpoint_landmarks.http.event_stream import VersionFeed
+from trigpoint_landmarks.http.measures import RequestMeasures
 from trigpoint_landmarks.http.pages import Pages
 from trigpoint_landmarks.http.problems import Problem, problem_of, problem_response
 from trigpoint_landmarks.http.settings import WebSettings, is_loopback
 from trigpoint_landmarks.http.tokens import Scope
+from trigpoint_landmarks.http.viewer_api import ACCESS_PATH
+from trigpoint_landmarks.http.viewer_files import PREFIX, viewer_files
 
 READING = frozenset({"GET", "HEAD"})
 EVERYWHERE = ((b"x-content-type-options", b"nosniff"), (b"referrer-policy", b"no-referrer"))
@@ -41,12 +48,24 @@ class Reading(Protocol):
         """A tile."""
 
 
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """What works beside the handlers: who follows the versions, and what is measured."""
+
+    feed: VersionFeed
+    measures: RequestMeasures
+
+
 class Front:
     """An ASGI application in front of another one."""
 
-    def __init__(self, behind: Any, api: Reading, admission: Admission, settings: WebSettings) -> None:
+    def __init__(
+        self, behind: Any, api: Reading, admission: Admission, settings: WebSettings, *, beside: Beside
+    ) -> None:
         self._behind, self._api, self._admission, self._settings = behind, api, admission, settings
+        self._feed, self._measures = beside.feed, beside.measures
         self._local_only = settings.token_file is None and not settings.open_reading
+        self._viewer = viewer_files()
         self._under_way = 0
 
     async def __call__(self, scope: Message, receive: Receive, send: Any) -> None:
@@ -54,12 +73,12 @@ class Front:
         if scope["type"] != "http":
             await self._behind(scope, receive, send)
             return
-        started = False
+        started, status, began_s = False, 0, time.perf_counter()
 
         async def sent(message: Message) -> None:
-            nonlocal started
+            nonlocal started, status
             if message["type"] == "http.response.start":
-                started = True
+                started, status = True, message["status"]
                 message["headers"] = [*message.get("headers", ()), *EVERYWHERE]
             await send(message)
 
@@ -73,13 +92,22 @@ class Front:
                 await problem_response(problem_of(error))(scope, receive, sent)
         finally:
             self._under_way -= 1
+            if status:  # else whoever asked went before there was an answer
+                self._measures.answered(scope["path"], status, seconds=time.perf_counter() - began_s)
 
     async def _answer(self, scope: Message, receive: Receive, send: Any) -> None:
         caller = self._admission.caller(scope)
         if self._local_only and not _called_locally(scope):
             raise Problem(HTTPStatus.MISDIRECTED_REQUEST, "only this machine's own names are served here")
-        caller.require(_needed(scope))
+        if scope["method"] in READING and _is_of_viewer(scope):  # its files hold nothing of the map
+            await self._viewer.answer(scope["path"].removeprefix(PREFIX))(scope, receive, send)
+            return
+        if scope["path"] != ACCESS_PATH:  # who may do nothing may ask so
+            caller.require(_needed(scope))
         scope.setdefault("state", {})["caller"] = caller
+        if scope["path"] == EVENTS_PATH and scope["method"] in READING:
+            await self._follow(scope, receive, send)
+            return
         if scope["method"] in READING:
             response = await self._busiest(scope, receive)
             if response is not None:
@@ -88,6 +116,14 @@ class Front:
         else:
             receive = await self._with_body(scope, receive)
         await self._behind(scope, receive, send)
+
+    async def _follow(self, scope: Message, receive: Receive, send: Any) -> None:
+        """One who listens for long: bounded by themselves, these are none of the requests under way."""
+        self._under_way -= 1
+        try:
+            await self._feed.serve(scope, receive, send)
+        finally:
+            self._under_way += 1
 
     async def _busiest(self, scope: Message, receive: Receive) -> Response | None:
         """Items and tiles without the framework's way to them; None for any other path."""
@@ -119,6 +155,12 @@ def _needed(scope: Message) -> Scope:
     if scope["method"] in READING or scope["method"] == "OPTIONS":
         return Scope.READ
     return Scope.ADMINISTER if scope["path"].startswith("/drives") else Scope.LABEL
+
+
+def _is_of_viewer(scope: Message) -> bool:
+    """Whether a path is one of the viewer's."""
+    path: str = scope["path"]
+    return path == PREFIX or path.startswith(f"{PREFIX}/")
 
 
 def _called_locally(scope: Message) -> bool:

@@ -21,6 +21,8 @@ class MapWatch:
         self._source, self._look_s = source, look_s
         self._state: MapState | None = None
         self._told = asyncio.Event()
+        self.changed = asyncio.Event()  # set, and another one in its place, with each new version and what else changes
+        self.closed = False
         self.reached = False  # the database, at the last look
 
     @property
@@ -34,9 +36,35 @@ class MapWatch:
 
     async def look(self) -> None:
         """The map as it is now. Raises DatabaseUnavailable, and what else the source does."""
-        self.reached = False
-        self._state = await self._source.state(self._state)
-        self.reached = True
+        try:
+            state = await self._source.state(self._state)
+        except TrigpointError:
+            self._become(self._state, reached=False)
+            raise
+        self._become(state, reached=True)
+
+    async def changes(self, since: asyncio.Event, *, within_s: float) -> None:
+        """Until something is other than when `changed` was `since`, or so long."""
+        try:
+            await asyncio.wait_for(since.wait(), within_s)
+        except TimeoutError:
+            return
+
+    def close(self) -> None:
+        """Whoever waits for changes is told that none will come."""
+        self.closed = True
+        self._announce()
+
+    def _become(self, state: MapState | None, *, reached: bool) -> None:
+        changed = state is not self._state or reached is not self.reached
+        self._state, self.reached = state, reached
+        if changed:
+            self._announce()
+
+    def _announce(self) -> None:
+        """Who waits goes on; who asks from now on waits for the next change."""
+        announced, self.changed = self.changed, asyncio.Event()
+        announced.set()
 
     async def current(self) -> MapState | None:
         """The map; looked at where the database was away at the last look."""

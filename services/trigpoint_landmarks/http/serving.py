@@ -5,6 +5,7 @@ import logging
 import socket
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import uvicorn
 import uvloop
@@ -14,9 +15,10 @@ from trigpoint.errors import ServiceError
 from trigpoint.events.keys import DEFAULT_ROOT, KEY_PATTERNS, KEY_VERSION
 from trigpoint.events.mapped import MapSolved
 from trigpoint.landmarks.feature_query import FeatureSource
-from trigpoint_landmarks.http.application import application
+from trigpoint.observability.metrics import Instruments
+from trigpoint_landmarks.http.application import Served, application
 from trigpoint_landmarks.http.map_watch import MapWatch
-from trigpoint_landmarks.http.ports import MapCorrections
+from trigpoint_landmarks.http.ports import MapCorrections, MeasuredDrives
 from trigpoint_landmarks.http.settings import WebSettings
 
 LISTEN_S = 0.5  # between two looks whether to go on listening to the bus
@@ -25,6 +27,17 @@ KEEP_ALIVE_S = 30
 WAITING = 1024  # connections not yet accepted
 
 logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServedLog:
+    """What a log takes and what it holds; None: there is no log."""
+
+    corrections: MapCorrections | None = None
+    drives: MeasuredDrives | None = None
+
+
+NO_LOG = ServedLog()
 
 
 class HttpService:
@@ -38,11 +51,13 @@ class HttpService:
         settings: WebSettings,
         open_source: Callable[[], FeatureSource],
         *,
-        corrections: MapCorrections | None = None,
+        log: ServedLog = NO_LOG,
         bus: Bus | None = None,
         root: str = DEFAULT_ROOT,
+        instruments: Instruments | None = None,
     ) -> None:
-        self._settings, self._open_source, self._corrections = settings, open_source, corrections
+        self._settings, self._open_source, self._log = settings, open_source, log
+        self._instruments = instruments or Instruments("http")
         self._socket = _listening(settings)
         self._subscription: Subscription | None = None
         if bus is not None:
@@ -75,7 +90,8 @@ class HttpService:
     async def _serve(self, stop: threading.Event) -> None:
         source = self._open_source()
         watch = MapWatch(source, look_s=self._settings.look_s)
-        server = uvicorn.Server(self._configuration(application(self._settings, source, watch, self._corrections)))
+        served = Served(source=source, watch=watch, corrections=self._log.corrections, drives=self._log.drives)
+        server = uvicorn.Server(self._configuration(application(self._settings, served, self._instruments)))
         following = asyncio.create_task(watch.follow())
         listening = asyncio.create_task(self._listen(watch, stop))
         serving = asyncio.create_task(server.serve([self._socket]))
@@ -84,6 +100,7 @@ class HttpService:
         try:
             await asyncio.wait((serving, listening), return_when=asyncio.FIRST_COMPLETED)
             server.should_exit = True
+            watch.close()  # who listens is let go, so that the server need not wait for them
             await serving
         finally:
             self._watch = None

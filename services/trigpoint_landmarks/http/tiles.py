@@ -12,6 +12,7 @@ from trigpoint.geodesy.web_tiles import WebTile
 from trigpoint.landmarks.feature_query import FeatureSource, MapState
 from trigpoint.landmarks.layers import LAYERS, Layer
 from trigpoint.landmarks.tile_grid import require_tile
+from trigpoint.observability.metrics import Instruments
 from trigpoint_landmarks.http.asked import Asked
 from trigpoint_landmarks.http.compression import GZIP, TILE_LEVEL, VARY, compressed
 from trigpoint_landmarks.http.documents import MVT
@@ -40,8 +41,11 @@ class Held:
 class Tiles:
     """Tiles from a source, of the version a watch knows, each drawn once for all who ask for it at the same time."""
 
-    def __init__(self, source: FeatureSource, watch: MapWatch, *, cache_bytes: int, public: bool) -> None:
+    def __init__(
+        self, source: FeatureSource, watch: MapWatch, *, cache_bytes: int, public: bool, instruments: Instruments
+    ) -> None:
         self._source, self._watch = source, watch
+        self._hits, self._misses = instruments.tile_cache_hits, instruments.tile_cache_misses
         self._cache = TileCache(limit_bytes=cache_bytes)
         self._drawing: dict[TileKey, asyncio.Task[bytes]] = {}
         self._audience = "public" if public else "private"
@@ -79,9 +83,11 @@ class Tiles:
     async def _content(self, key: TileKey, layer: Layer, state: MapState) -> bytes:
         held = self._cache.get(key)
         if held is not None:
+            self._hits.inc()
             return held
         drawing = self._drawing.get(key)
         if drawing is None:
+            self._misses.inc()
             drawing = asyncio.create_task(self._drawn(key, layer, state))
             self._drawing[key] = drawing
             drawing.add_done_callback(lambda _: self._drawing.pop(key, None))

@@ -9,10 +9,18 @@ import gtsam
 import numpy as np
 from numpy.typing import NDArray
 
+from trigpoint.anchoring.gain import label_terms
 from trigpoint.events.corrected import AnchorLabelled
 from trigpoint.events.drives import Drive
 from trigpoint.events.estimated import FixJudged
-from trigpoint.events.mapped import AnchorAssociated, ImageOffsetSolved, LandmarkSolved, MapSolved, TrajectorySolved
+from trigpoint.events.mapped import (
+    AnchorAssociated,
+    ImageOffsetSolved,
+    LabelGainSolved,
+    LandmarkSolved,
+    MapSolved,
+    TrajectorySolved,
+)
 from trigpoint.events.solved import LabelReduction, SolvedMap
 from trigpoint.geodesy.projection import MapFrame
 from trigpoint_optimisation.core.anchoring import residuals_m
@@ -149,6 +157,7 @@ def _solved_map(solved: Solved, *, joint_covariance_m2: Floats) -> SolvedMap:
         landmarks=landmarks,
         anchors=anchors,
         images=_images(solved, joint_covariance_m2),
+        gains=_gains(solved, joint_covariance_m2, tuple(landmark.landmark for landmark in landmarks)),
     )
 
 
@@ -313,6 +322,18 @@ def _images(solved: Solved, joint_covariance_m2: Floats) -> tuple[ImageOffsetSol
         )
         for i, name in enumerate(solved.labels.images)
     )
+
+
+def _gains(solved: Solved, joint_covariance_m2: Floats, names: tuple[str, ...]) -> tuple[LabelGainSolved, ...]:
+    """What one more label would tell: in none of the images, then in each of them."""
+    found = []
+    for number, image in ((None, ""), *enumerate(solved.labels.images)):
+        expected_m2, shared_m4 = label_terms(joint_covariance_m2, landmark_count=len(names), image=number)
+        gain = LabelGainSolved(
+            map_version=UNNUMBERED, image=image, landmarks=names, expected_m2=expected_m2, shared_m4=shared_m4
+        )
+        found.append(gain)
+    return tuple(found)
 
 
 def _label_reduction(solved: Solved) -> LabelReduction:

@@ -7,17 +7,20 @@ import gtsam
 import numpy as np
 from numpy.typing import NDArray
 
+from trigpoint.anchoring.association import (
+    Assignment,
+    AssociationLimits,
+    MapKnowledge,
+    by_signature,
+    is_by_signature,
+    nearest_assignment,
+)
+from trigpoint.anchoring.labels import Labels, labels_of
 from trigpoint.errors import AlignmentRefused
 from trigpoint.events.corrected import AnchorLabelled
 from trigpoint.events.drives import Drive
 from trigpoint.geodesy.projection import MapFrame
 from trigpoint_optimisation.core.anchoring import (
-    Assignment,
-    Labels,
-    by_signature,
-    image_shifts_m,
-    labels_of,
-    nearest_assignment,
     residuals_m,
     signed_points,
     tied_labels,
@@ -249,30 +252,26 @@ def first_assignment(solved: Solved) -> Assignment:
 def renewed_assignment(solved: Solved) -> Assignment:
     """Labels tied anew after a solve; those whose residual is beyond belief are let go."""
     settings, labels, state = solved.fleet.settings.anchors, solved.labels, solved.state
-    if any(reason == "signature" for reason in solved.assignment.reason):
+    if is_by_signature(solved.assignment.reason):
         assignment = by_signature(labels, landmark_signatures(solved))
     else:
-        sigma = _expected_sigma(solved)
-        shift_m = image_shifts_m(labels, state.image_m)
-        assignment = nearest_assignment(labels, state.landmark_m, shift_m=shift_m, sigma_m=sigma, settings=settings)
+        limits = AssociationLimits(gate_sigmas=settings.gate_sigmas, second_ratio=settings.second_ratio)
+        assignment = nearest_assignment(labels, _known(solved), limits=limits)
     residual = residuals_m(labels, assignment, state.landmark_m, state.image_m)
     limit_sigmas = settings.outlier_sigmas
     return without_outliers(assignment, solved.assignment, residual, _residual_sigma(solved), limit_sigmas=limit_sigmas)
 
 
-def _expected_sigma(solved: Solved) -> Floats:
-    """1-sigma per axis (a,) of a label around its landmark as the solve predicts it, untied labels included."""
-    reduction = reduced_landmarks(solved)
+def _known(solved: Solved) -> MapKnowledge:
+    """What the solve knows of landmarks and images, untied labels' images included."""
     count = solved.association.landmark_count
-    covariance = covariance_of(reduction)
-    variance = np.diag(covariance).reshape(-1, 2).max(axis=1)
-    labels = solved.labels
-    expected = labels.label_m - image_shifts_m(labels, solved.state.image_m)
-    distance = np.hypot(*(expected[:, None, :] - solved.state.landmark_m[None, :, :]).transpose(2, 0, 1))
-    image = np.append(variance[count:], 0.0)[labels.image]
-    expected_m2 = variance[:count][distance.argmin(axis=1)] + image + labels.sigma_m**2
-    sigma_m: Floats = np.sqrt(expected_m2)
-    return sigma_m
+    variance = np.diag(covariance_of(reduced_landmarks(solved))).reshape(-1, 2).max(axis=1)
+    return MapKnowledge(
+        landmark_m=solved.state.landmark_m,
+        landmark_variance_m2=variance[:count],
+        image_m=solved.state.image_m,
+        image_variance_m2=variance[count:],
+    )
 
 
 def _residual_sigma(solved: Solved) -> Floats:

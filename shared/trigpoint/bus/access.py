@@ -79,6 +79,7 @@ OPTIMISATION = Grant(
         "map/*/lm/**",
         "map/*/association",
         "map/*/image-offset",
+        "map/*/label-gain",
         "map/*/version",
         "veh/*/corr/**",
     ),

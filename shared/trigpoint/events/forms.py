@@ -17,6 +17,7 @@ from trigpoint.events.estimated import FixJudged, GateAlarmed, PoseFiltered
 from trigpoint.events.mapped import (
     AnchorAssociated,
     ImageOffsetSolved,
+    LabelGainSolved,
     LandmarkSolved,
     MapSolved,
     OdometryCorrected,
@@ -298,6 +299,28 @@ def _offset_event(message: mapped_pb2.ImageOffsetSolved) -> ImageOffsetSolved:
     )
 
 
+def _gain_message(event: LabelGainSolved) -> mapped_pb2.LabelGainSolved:
+    shape = (len(event.landmarks), 3)
+    return mapped_pb2.LabelGainSolved(
+        map_version=event.map_version,
+        image=event.image,
+        landmarks=event.landmarks,
+        expected_m2=_listed(event.expected_m2, shape),
+        shared_m4=_listed(event.shared_m4, shape),
+    )
+
+
+def _gain_event(message: mapped_pb2.LabelGainSolved) -> LabelGainSolved:
+    shape = (len(message.landmarks), 3)
+    return LabelGainSolved(
+        map_version=message.map_version,
+        image=message.image,
+        landmarks=tuple(message.landmarks[:]),
+        expected_m2=_array(message.expected_m2, shape),
+        shared_m4=_array(message.shared_m4, shape),
+    )
+
+
 def _odometry_message(event: OdometryCorrected) -> mapped_pb2.OdometryCorrected:
     return mapped_pb2.OdometryCorrected(
         vehicle=event.vehicle,
@@ -339,5 +362,6 @@ FORMS: tuple[Form[Any, Any], ...] = (
     Form(LandmarkSolved, mapped_pb2.LandmarkSolved, _landmark_message, _landmark_event),
     Form(AnchorAssociated, mapped_pb2.AnchorAssociated, _association_message, _association_event),
     Form(ImageOffsetSolved, mapped_pb2.ImageOffsetSolved, _offset_message, _offset_event),
+    Form(LabelGainSolved, mapped_pb2.LabelGainSolved, _gain_message, _gain_event),
     Form(OdometryCorrected, mapped_pb2.OdometryCorrected, _odometry_message, _odometry_event),
 )

@@ -11,6 +11,7 @@ from trigpoint.events.estimated import FixJudged, GateAlarmed, PoseFiltered
 from trigpoint.events.mapped import (
     AnchorAssociated,
     ImageOffsetSolved,
+    LabelGainSolved,
     LandmarkSolved,
     MapSolved,
     OdometryCorrected,
@@ -59,6 +60,7 @@ KEY_PATTERNS: Mapping[type, str] = {
     LandmarkSolved: "map/{map}/lm/{zoom}/{column}/{row}",
     AnchorAssociated: "map/{map}/association",
     ImageOffsetSolved: "map/{map}/image-offset",
+    LabelGainSolved: "map/{map}/label-gain",
     MapSolved: "map/{map}/version",
     OdometryCorrected: "veh/{vehicle}/corr/odometry",
 }
@@ -87,6 +89,7 @@ STREAM_PATTERNS: Mapping[type, str] = {
     LandmarkSolved: "optimisation",
     AnchorAssociated: "optimisation",
     ImageOffsetSolved: "optimisation",
+    LabelGainSolved: "optimisation",
     MapSolved: "optimisation",
     OdometryCorrected: "odometry",
 }

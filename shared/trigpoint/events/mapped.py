@@ -95,6 +95,23 @@ class ImageOffsetSolved:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class LabelGainSolved:
+    """What one more label would tell of a map that was solved whole, for each of its `landmarks` (l).
+
+    The label lies in `image`, one the map knows the offset of; empty: in none of them. expected_m2 (l, 3): covariance
+    xx, xy, yy of where such a label lies but for its own noise; shared_m4 (l, 3): the same entries of its covariances
+    with all landmarks, multiplied with their transpose and summed. A label of covariance R then lowers the landmarks'
+    summed variance by the trace of (expected + R)^-1 shared.
+    """
+
+    map_version: int
+    image: str
+    landmarks: tuple[str, ...]
+    expected_m2: Floats
+    shared_m4: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class OdometryCorrected:
     """Where a vehicle's own dead reckoning lies in the map, for the vehicle to place itself by.
 
@@ -111,4 +128,4 @@ class OdometryCorrected:
     covariance: Floats
 
 
-Mapped = MapSolved | TrajectorySolved | LandmarkSolved | AnchorAssociated | ImageOffsetSolved
+Mapped = MapSolved | TrajectorySolved | LandmarkSolved | AnchorAssociated | ImageOffsetSolved | LabelGainSolved

@@ -10,6 +10,7 @@ from trigpoint.events.envelope import Envelope
 from trigpoint.events.mapped import (
     AnchorAssociated,
     ImageOffsetSolved,
+    LabelGainSolved,
     LandmarkSolved,
     Mapped,
     MapSolved,
@@ -29,10 +30,11 @@ class SolvedMap:
     landmarks: tuple[LandmarkSolved, ...]
     anchors: tuple[AnchorAssociated, ...]
     images: tuple[ImageOffsetSolved, ...]
+    gains: tuple[LabelGainSolved, ...] = ()
 
     def events(self) -> tuple[Mapped, ...]:
         """All events of the version in the order they are appended: the head last."""
-        return (*self.trajectories, *self.landmarks, *self.anchors, *self.images, self.head)
+        return (*self.trajectories, *self.landmarks, *self.anchors, *self.images, *self.gains, self.head)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,6 +113,7 @@ def _upon(base: SolvedMap, change: SolvedMap) -> SolvedMap:
         landmarks=tuple(one for name, one in landmarks.items() if name not in removed),
         anchors=tuple({(one.anchor, one.image): one for one in (*base.anchors, *change.anchors)}.values()),
         images=tuple({one.image: one for one in (*base.images, *change.images)}.values()),
+        gains=change.gains or base.gains,
     )
 
 
@@ -128,4 +131,5 @@ def _assembled(head: MapSolved, parts: list[Mapped]) -> SolvedMap:
         landmarks=tuple(part for part in parts if isinstance(part, LandmarkSolved)),
         anchors=tuple(part for part in parts if isinstance(part, AnchorAssociated)),
         images=tuple(part for part in parts if isinstance(part, ImageOffsetSolved)),
+        gains=tuple(part for part in parts if isinstance(part, LabelGainSolved)),
     )

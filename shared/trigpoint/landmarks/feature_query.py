@@ -8,6 +8,7 @@ from trigpoint.geodesy.web_tiles import WebTile
 from trigpoint.landmarks.conditions import Condition
 from trigpoint.landmarks.feature_crs import CRS84, FeatureCrs
 from trigpoint.landmarks.layers import Layer
+from trigpoint.landmarks.model import LabelGain
 from trigpoint.landmarks.queries import DegreeBox, TimeSpan
 
 PAGE_MOST = 10_000  # features
@@ -77,6 +78,19 @@ class MapState:
         return self.versions[-1]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VersionSummary:
+    """What is said of a map version in a list of many; `base_version` 0: it was solved whole."""
+
+    map_version: int
+    base_version: int
+    method: str
+    landmark_count: int
+    anchor_count: int
+    wall_s: float
+    solved_ns: int
+
+
 class FeatureSource(Protocol):
     """Answers from one landmark database, which it only reads.
 
@@ -92,6 +106,15 @@ class FeatureSource(Protocol):
 
     async def tile(self, layer: Layer, tile: WebTile, state: MapState, *, as_of: int) -> bytes:
         """The vector tile of a layer that has any, empty if nothing is in it."""
+
+    async def history(self, limit: int) -> tuple[VersionSummary, ...]:
+        """The newest versions, so many at most, in order."""
+
+    async def settings_json(self, as_of: int) -> str:
+        """The settings a version was solved with."""
+
+    async def label_gains(self, as_of: int) -> tuple[LabelGain, ...]:
+        """What one more label would tell by the newest version solved whole up to this one, in order of image."""
 
     async def close(self) -> None:
         """Nothing more is held open."""

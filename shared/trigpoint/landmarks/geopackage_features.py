@@ -14,15 +14,17 @@ from sqlalchemy import Connection
 from trigpoint.errors import DatabaseUnavailable
 from trigpoint.geodesy.web_tiles import WebTile
 from trigpoint.landmarks.condition_truth import meets
-from trigpoint.landmarks.feature_query import FeaturePage, FeatureQuery, GridBox, MapState
+from trigpoint.landmarks.feature_query import FeaturePage, FeatureQuery, GridBox, MapState, VersionSummary
 from trigpoint.landmarks.feature_rendering import LayerRow, MapFeature, features_json, map_feature, row_of_record
 from trigpoint.landmarks.geopackage_feature_sql import page_statement, tile_statement
 from trigpoint.landmarks.geopackage_file import close, database_errors, driver_of, opened
 from trigpoint.landmarks.geopackage_geometry import decoded, decoded_point
 from trigpoint.landmarks.landmark_record import LandmarkRecord, landmark_of
 from trigpoint.landmarks.layers import LANDMARKS, Layer
+from trigpoint.landmarks.model import LabelGain
 from trigpoint.landmarks.python_tiles import drawn_lines, drawn_points
 from trigpoint.landmarks.queries import DegreeBox, TimeSpan
+from trigpoint.landmarks.version_sql import GAINS, HISTORY, SETTINGS, gain_of, summary_of
 
 Answer = TypeVar("Answer")
 
@@ -51,6 +53,21 @@ class GeoPackageFeatures:
     async def tile(self, layer: Layer, tile: WebTile, state: MapState, *, as_of: int) -> bytes:
         """The vector tile of a layer, empty if nothing is in it."""
         return await self._asked(lambda driver: _tile(driver, layer, tile, state, as_of))
+
+    async def history(self, limit: int) -> tuple[VersionSummary, ...]:
+        """The newest versions in order."""
+        rows = await self._asked(lambda driver: driver.execute(HISTORY, {"limit": limit}).fetchall())
+        return tuple(summary_of(row) for row in reversed(rows))
+
+    async def settings_json(self, as_of: int) -> str:
+        """The settings a version was solved with."""
+        ((settings_json,),) = await self._asked(lambda driver: driver.execute(SETTINGS, {"as_of": as_of}).fetchall())
+        return str(settings_json)
+
+    async def label_gains(self, as_of: int) -> tuple[LabelGain, ...]:
+        """What one more label would tell."""
+        rows = await self._asked(lambda driver: driver.execute(GAINS, {"as_of": as_of}).fetchall())
+        return tuple(map(gain_of, rows))
 
     async def close(self) -> None:
         """The file closed."""

@@ -72,6 +72,7 @@ FEATURE_LAYERS = (
 ATTRIBUTE_LAYERS = (
     AttributeLayer("map_versions", "Every map version: method, settings, inputs, frame"),
     AttributeLayer("image_offsets", "Offsets of the aerial images, in every map version"),
+    AttributeLayer("label_gains", "What one more label would tell, in every map version solved whole"),
     AttributeLayer("log_checkpoints", "How far the event log has been taken in"),
 )
 

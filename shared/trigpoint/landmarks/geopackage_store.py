@@ -141,6 +141,7 @@ class GeoPackageStore:
             yield from map(records.trajectory_of, self._records(tables.trajectories))
             yield from map(records.anchor_of, self._records(tables.anchors))
             yield from map(records.image_offset_of, self._records(tables.image_offsets))
+            yield from map(records.label_gain_of, self._records(tables.label_gains))
 
     def damage(self) -> tuple[str, ...]:
         """What SQLite finds wrong with the file and its spatial indexes; nothing for a sound one."""
@@ -214,6 +215,7 @@ class GeoPackageStore:
         self._insert(tables.trajectories, [records.trajectory_record(row, srs_id) for row in change.trajectories])
         self._insert(tables.anchors, [records.anchor_record(row, srs_id) for row in change.anchors])
         self._insert(tables.image_offsets, [records.plain_record(row) for row in change.image_offsets])
+        self._insert(tables.label_gains, [records.plain_record(row) for row in change.label_gains])
 
     def _open_landmarks(self, change: MapChange, srs_id: int) -> None:
         values = (

@@ -7,6 +7,7 @@ from trigpoint.landmarks.model import (
     Anchor,
     Checkpoint,
     ImageOffset,
+    LabelGain,
     Landmark,
     LandmarkChanges,
     MapChange,
@@ -26,7 +27,7 @@ class MemoryStore:
         self._versions: tuple[MapVersion, ...] = ()
         self._valid: dict[str, Landmark] = {}
         self._ended: tuple[Landmark, ...] = ()
-        self._others: tuple[Trajectory | Anchor | ImageOffset, ...] = ()
+        self._others: tuple[Trajectory | Anchor | ImageOffset | LabelGain, ...] = ()
         self._checkpoint = Checkpoint()
 
     def apply(self, change: MapChange, checkpoint: Checkpoint) -> None:
@@ -111,7 +112,7 @@ class MemoryStore:
         valid, ended = self._after(change)
         self._valid, self._ended = valid, self._ended + ended
         self._versions += (change.version,)
-        self._others += change.trajectories + change.anchors + change.image_offsets
+        self._others += change.trajectories + change.anchors + change.image_offsets + change.label_gains
 
     def _after(self, change: MapChange) -> tuple[dict[str, Landmark], tuple[Landmark, ...]]:
         map_version = change.version.map_version

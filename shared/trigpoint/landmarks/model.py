@@ -150,7 +150,21 @@ class ImageOffset:
     variance_y_m2: float
 
 
-MapRow = MapVersion | Landmark | Trajectory | Anchor | ImageOffset
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LabelGain:
+    """What one more label in an image ("": in none the map knows the offset of) would tell of one whole map version.
+
+    `landmarks_json` is a list of ids; `terms_json` of each of them [xx, xy, yy of `expected_m2`, xx, xy, yy of
+    `shared_m4`], as `LabelGainSolved` has them.
+    """
+
+    map_version: int
+    image: str
+    landmarks_json: str
+    terms_json: str
+
+
+MapRow = MapVersion | Landmark | Trajectory | Anchor | ImageOffset | LabelGain
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -164,6 +178,7 @@ class MapChange:
     trajectories: tuple[Trajectory, ...]
     anchors: tuple[Anchor, ...]
     image_offsets: tuple[ImageOffset, ...]
+    label_gains: tuple[LabelGain, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

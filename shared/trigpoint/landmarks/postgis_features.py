@@ -1,6 +1,7 @@
 """Pages of features and vector tiles from a PostGIS database, for many askers at once."""
 
 import asyncio
+import re
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import replace
@@ -13,14 +14,16 @@ from sqlalchemy import URL
 
 from trigpoint.errors import DatabaseUnavailable, InputError, ServiceError
 from trigpoint.geodesy.web_tiles import WebTile
-from trigpoint.landmarks.feature_query import FeaturePage, FeatureQuery, MapState
+from trigpoint.landmarks.feature_query import FeaturePage, FeatureQuery, MapState, VersionSummary
 from trigpoint.landmarks.feature_rendering import LayerRow, features_json, map_feature, row_of_record
 from trigpoint.landmarks.layers import LANDMARKS, Layer
+from trigpoint.landmarks.model import LabelGain
 from trigpoint.landmarks.postgis_feature_sql import landmark_page_statement, row_page_statement
 from trigpoint.landmarks.postgis_geometry import decoded
 from trigpoint.landmarks.postgis_session import AWAY, SESSION, server_url
 from trigpoint.landmarks.postgis_tiles import tile_statement
 from trigpoint.landmarks.queries import DegreeBox, TimeSpan
+from trigpoint.landmarks.version_sql import GAINS, HISTORY, SETTINGS, gain_of, summary_of
 
 STATEMENT_LIMIT_MS = 10_000  # a question that takes longer is given up
 READING = (
@@ -86,12 +89,31 @@ class PostgisFeatures:
             ((content,),) = await _rows(connection, statement, values)
         return bytes(content or b"")
 
+    async def history(self, limit: int) -> tuple[VersionSummary, ...]:
+        """The newest versions in order."""
+        rows = await self._named_rows(HISTORY, {"limit": limit})
+        return tuple(summary_of(row) for row in reversed(rows))
+
+    async def settings_json(self, as_of: int) -> str:
+        """The settings a version was solved with."""
+        ((settings_json,),) = await self._named_rows(SETTINGS, {"as_of": as_of})
+        return str(settings_json)
+
+    async def label_gains(self, as_of: int) -> tuple[LabelGain, ...]:
+        """What one more label would tell."""
+        return tuple(map(gain_of, await self._named_rows(GAINS, {"as_of": as_of})))
+
     async def close(self) -> None:
         """Every connection ended."""
         self._closed = True
         for connection in self._idle:
             await connection.close()
         self._idle.clear()
+
+    async def _named_rows(self, statement: str, values: Mapping[str, int]) -> list[Any]:
+        """The rows of a statement whose values are named `:name`."""
+        async with self._connection() as connection:
+            return await _rows(connection, re.sub(r":(\w+)", r"%(\1)s", statement), values)
 
     async def _landmark_page(self, query: FeatureQuery, state: MapState) -> FeaturePage:
         statement, values = landmark_page_statement(query, state)

@@ -135,6 +135,7 @@ class PostgisStore:
             yield from map(records.trajectory_of, _records(connection, tables.trajectories))
             yield from map(records.anchor_of, _records(connection, tables.anchors))
             yield from map(records.image_offset_of, _records(connection, tables.image_offsets))
+            yield from map(records.label_gain_of, _records(connection, tables.label_gains))
 
     def damage(self) -> tuple[str, ...]:
         """Nothing: a server checks its pages itself."""
@@ -224,6 +225,7 @@ def _write(connection: Connection, changes: Sequence[MapChange]) -> None:
         (tables.trajectories, [records.trajectory_record(row, srs_id) for one in changes for row in one.trajectories]),
         (tables.anchors, [records.anchor_record(row, srs_id) for one in changes for row in one.anchors]),
         (tables.image_offsets, [records.plain_record(row) for one in changes for row in one.image_offsets]),
+        (tables.label_gains, [records.plain_record(row) for one in changes for row in one.label_gains]),
     ):
         if rows:
             copy_records(driver, target, rows)

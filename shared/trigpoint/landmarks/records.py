@@ -6,12 +6,12 @@ from dataclasses import fields
 from functools import lru_cache
 
 from trigpoint.landmarks.geopackage_geometry import Coordinates
-from trigpoint.landmarks.model import Anchor, ImageOffset, MapVersion, Trajectory
+from trigpoint.landmarks.model import Anchor, ImageOffset, LabelGain, MapVersion, Trajectory
 
 Record = dict[str, object]
 
 
-def _plain(row: Trajectory | Anchor | ImageOffset | MapVersion, *without: str) -> Record:
+def _plain(row: Trajectory | Anchor | ImageOffset | LabelGain | MapVersion, *without: str) -> Record:
     return {field.name: getattr(row, field.name) for field in fields(row) if field.name not in without}
 
 
@@ -40,7 +40,7 @@ def anchor_record(anchor: Anchor, srs_id: int) -> Record:
     return _plain(anchor, "easting_m", "northing_m") | {"geom": point}
 
 
-def plain_record(row: ImageOffset | MapVersion) -> Record:
+def plain_record(row: ImageOffset | LabelGain | MapVersion) -> Record:
     """The record of a row without geometry."""
     return _plain(row)
 
@@ -63,12 +63,19 @@ def image_offset_of(record: Mapping[str, object]) -> ImageOffset:
     return ImageOffset(**_values(record, ImageOffset))  # type: ignore[arg-type]
 
 
+def label_gain_of(record: Mapping[str, object]) -> LabelGain:
+    """The label gain of a record."""
+    return LabelGain(**_values(record, LabelGain))  # type: ignore[arg-type]
+
+
 def map_version_of(record: Mapping[str, object]) -> MapVersion:
     """The map version of a record."""
     return MapVersion(**_values(record, MapVersion))  # type: ignore[arg-type]
 
 
-def _values(record: Mapping[str, object], kind: type[Trajectory | Anchor | ImageOffset | MapVersion]) -> Record:
+def _values(
+    record: Mapping[str, object], kind: type[Trajectory | Anchor | ImageOffset | LabelGain | MapVersion]
+) -> Record:
     return {field.name: record[field.name] for field in fields(kind) if field.name in record}
 
 

@@ -171,6 +171,15 @@ image_offsets = Table(
     UniqueConstraint("image", "map_version"),
 )
 
+label_gains = Table(
+    "label_gains",
+    metadata,
+    _feature_id(),
+    _whole("map_version"),
+    *(_text(column) for column in ("image", "landmarks_json", "terms_json")),
+    UniqueConstraint("map_version", "image"),
+)
+
 map_versions = Table(
     "map_versions",
     metadata,

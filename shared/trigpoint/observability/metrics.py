@@ -38,6 +38,10 @@ class Instruments:
         self.restarts = self._counter("restarts", "Times a supervised service was started anew.", "name")
         self.refused_access = self._counter("refused_access", "Sessions or messages refused by access control.")
         self.answers = self._counter("answers", "Questions answered.")
+        self.requests = self._counter("requests", "HTTP requests answered, by route template.", "route", "status")
+        self.tile_cache_hits = self._counter("tile_cache_hits", "Tiles answered from memory.")
+        self.tile_cache_misses = self._counter("tile_cache_misses", "Tiles drawn, for one who asked or many.")
+        self.listeners = self._gauge("listeners", "Those who follow the map's versions.")
         self.queue_depth = self._gauge("queue_depth", "Messages that wait to be worked on.")
         self.projection_lag_events = self._gauge("projection_lag_events", "Events in the log not yet taken in.")
         self.projection_lag_seconds = self._gauge("projection_lag_seconds", "Age of the oldest one not yet taken in.")
@@ -47,6 +51,7 @@ class Instruments:
         self.update_seconds = self._histogram("update_seconds", "Durations of incremental updates.")
         self.solve_seconds = self._histogram("solve_seconds", "Durations of whole solves.")
         self.answer_seconds = self._histogram("answer_seconds", "Durations of answering a question.")
+        self.request_seconds = self._histogram("request_seconds", "Durations of HTTP requests.", "route")
         self.projection_seconds = self._histogram("projection_seconds", "Durations of transactions of a projection.")
 
     def _counter(self, name: str, text: str, *labels: str) -> Counter:
@@ -55,8 +60,8 @@ class Instruments:
     def _gauge(self, name: str, text: str) -> Gauge:
         return Gauge(f"trigpoint_{name}", text, registry=self.registry)
 
-    def _histogram(self, name: str, text: str) -> Histogram:
-        durations = Durations(f"trigpoint_{name}", text, registry=self.registry, buckets=SECONDS)
+    def _histogram(self, name: str, text: str, *labels: str) -> Histogram:
+        durations = Durations(f"trigpoint_{name}", text, labels, registry=self.registry, buckets=SECONDS)
         durations.heard = self._heard
         return durations
 

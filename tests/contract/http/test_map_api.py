@@ -3,25 +3,19 @@
 import asyncio
 import json
 from collections.abc import Iterator
-from contextlib import closing
 from pathlib import Path
-from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
 
-from landmark_maps.examples import CRS, checkpoint
+from landmark_maps.examples import CRS
 from map_features.examples import two_versions
 from map_features.tile_reading import read_tile
 from map_http.asking import Api, asked_api, problem
 from map_http.corrections import MemoryCorrections
+from map_http.sources import filled_source
 from trigpoint.geodesy.positions import Wgs84Position
 from trigpoint.geodesy.web_tiles import tile_at
-from trigpoint.landmarks.feature_query import FeatureSource
-from trigpoint.landmarks.geopackage_features import GeoPackageFeatures
-from trigpoint.landmarks.geopackage_store import GeoPackageStore
-from trigpoint.landmarks.postgis_features import PostgisFeatures
-from trigpoint.landmarks.postgis_store import PostgisStore
 
 CRS84 = "http://www.opengis.net/def/crs/OGC/1.3/CRS84"
 EPSG = "http://www.opengis.net/def/crs/EPSG/0/"
@@ -34,26 +28,9 @@ TILE = f"/tiles/landmarks/15/{SYDNEY.column}/{SYDNEY.row}"
 @pytest.fixture(scope="module", params=["geopackage", pytest.param("postgis", marks=pytest.mark.postgis)])
 def api(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Api]:
     with pytest.MonkeyPatch.context() as patch, asyncio.Runner() as runner:
-        source = filled_source(request, tmp_path_factory.mktemp("api"), patch)
+        source = filled_source(request, tmp_path_factory.mktemp("api"), patch, two_versions())
         with asked_api(source, runner, corrections=MemoryCorrections()) as found:
             yield found
-
-
-def filled_source(request: pytest.FixtureRequest, folder: Path, patch: pytest.MonkeyPatch) -> FeatureSource:
-    """The map of two versions in a database of a kind."""
-    if request.param == "geopackage":
-        path = folder / "map.gpkg"
-        store: Any = GeoPackageStore(path)
-        source: FeatureSource = GeoPackageFeatures(path)
-    else:
-        cluster = request.getfixturevalue("postgis")
-        patch.setenv("PGPASSFILE", str(cluster.password_table))
-        url = cluster.url(cluster.created())
-        store, source = PostgisStore(url), PostgisFeatures(url)
-    with closing(store):
-        for number, change in enumerate(two_versions()):
-            store.apply(change, checkpoint(number + 1))
-    return source
 
 
 def test_the_landing_page_leads_everywhere(api: Api) -> None:

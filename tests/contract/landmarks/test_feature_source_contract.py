@@ -18,10 +18,18 @@ from trigpoint.geodesy.positions import Wgs84Position
 from trigpoint.geodesy.web_tiles import WebTile, corner_of, tile_at
 from trigpoint.landmarks.cql2_conditions import condition_from_text
 from trigpoint.landmarks.feature_crs import CRS84, offered_crs, storage_crs
-from trigpoint.landmarks.feature_query import FeaturePage, FeatureQuery, FeatureSource, GridBox, MapState
+from trigpoint.landmarks.feature_query import (
+    FeaturePage,
+    FeatureQuery,
+    FeatureSource,
+    GridBox,
+    MapState,
+    VersionSummary,
+)
 from trigpoint.landmarks.geopackage_features import GeoPackageFeatures
 from trigpoint.landmarks.geopackage_store import GeoPackageStore
 from trigpoint.landmarks.layers import ANCHORS, IMAGE_OFFSETS, LANDMARKS, LAYERS, TRAJECTORIES, Layer
+from trigpoint.landmarks.model import LabelGain
 from trigpoint.landmarks.postgis_features import PostgisFeatures
 from trigpoint.landmarks.postgis_store import PostgisStore
 from trigpoint.landmarks.queries import DegreeBox, TimeSpan
@@ -103,6 +111,15 @@ class Asked:
     def tile(self, layer: Layer, tile: WebTile, *, as_of: int = 2) -> bytes:
         return self._run(self._source.tile(layer, tile, self.map, as_of=as_of))
 
+    def history(self, limit: int = 10) -> tuple[VersionSummary, ...]:
+        return self._run(self._source.history(limit))
+
+    def settings_json(self, as_of: int) -> str:
+        return self._run(self._source.settings_json(as_of))
+
+    def label_gains(self, as_of: int) -> tuple[LabelGain, ...]:
+        return self._run(self._source.label_gains(as_of))
+
     def _run(self, coroutine: Coroutine[Any, Any, Result]) -> Result:
         return self._runner.run(coroutine)
 
@@ -143,6 +160,26 @@ def test_pages_are_equal(geopackage: Asked, server: Asked, layer: Layer, crs: An
     found = geopackage.features(layer, crs=crs, as_of=as_of)
     assert found == server.features(layer, crs=crs, as_of=as_of)
     assert len(found) == {"landmarks": 300, "trajectories": 2, "anchors": 3, "image_offsets": 1}[layer.name]
+
+
+def test_both_tell_the_same_history(geopackage: Asked, server: Asked) -> None:
+    found = geopackage.history()
+    assert found == server.history()
+    assert [(one.map_version, one.base_version) for one in found] == [(1, 0), (2, 1)]
+
+
+def test_of_a_long_history_the_newest_versions_are_told(source: Asked) -> None:
+    assert [one.map_version for one in source.history(1)] == [2]
+
+
+def test_a_version_s_settings_are_told(source: Asked) -> None:
+    assert source.settings_json(2) == "{}"
+
+
+@pytest.mark.parametrize("as_of", [1, 2])
+def test_what_a_label_would_tell_is_the_newest_whole_version_s(geopackage: Asked, server: Asked, as_of: int) -> None:
+    found = geopackage.label_gains(as_of)
+    assert found == server.label_gains(as_of) == (*two_versions()[0].label_gains,)
 
 
 @pytest.mark.parametrize("text", FILTERS)

@@ -247,7 +247,14 @@ def test_rows_hold_every_version_of_every_landmark(moved: LandmarkStore) -> None
 def test_trajectories_anchors_and_offsets_come_back_exactly(store: LandmarkStore) -> None:
     whole = examples.whole_change()
     store.apply(whole, checkpoint(1))
-    expected = {whole.version, *whole.opened, *whole.trajectories, *whole.anchors, *whole.image_offsets}
+    expected = {
+        whole.version,
+        *whole.opened,
+        *whole.trajectories,
+        *whole.anchors,
+        *whole.image_offsets,
+        *whole.label_gains,
+    }
     assert set(store.rows()) == expected
 
 

@@ -6,12 +6,22 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from command_runs.running import Run, trigpoint
 from command_runs.small_campus import LABELS, write_small_campus
+from trigpoint.events.mapped import TrajectorySolved
+from trigpoint.events.solved import SolvedMap
 from trigpoint.logs.mcap_log import McapLog
+from trigpoint.logs.readings import logged_maps, logged_verdicts
+from trigpoint_cli.data_dir import DataDirectory
+from trigpoint_cli.serving.measured_drives import LoggedMeasurements
+from trigpoint_landmarks.http.ports import DrivenPath
 from trigpoint_vehicle.app import Written
+
+Floats = NDArray[np.float64]
 
 ERROR_KEYS = {"count", "mean", "median", "rmse", "p95", "max"}
 
@@ -52,6 +62,44 @@ def test_the_same_logs_again_change_nothing(campus: BuiltCampus, tmp_path: Path)
     assert (answer["accepted"], answer["duplicates"]) == (0, campus.ingested.answer["accepted"])
     again = trigpoint("anchors", "import", str(campus.written.anchors), "--data", data, "--json").answer
     assert again["anchors"] == {"added": 0, "known": LABELS, "relabelled": 0, "refused": 0}
+
+
+def test_paths_by_odometry_begin_where_the_map_has_them_and_drift_from_there(campus: BuiltCampus) -> None:
+    measured = LoggedMeasurements(DataDirectory(campus.data))
+    solved = {(one.vehicle, one.boot_id): one for one in newest_map(campus.data).trajectories}
+    paths = measured.paths("odometry")
+    assert [(one.vehicle, one.boot_id) for one in paths] == sorted(solved)
+    for path in paths:
+        path_m = on_path_m(path, solved[path.vehicle, path.boot_id])
+        assert path_m[0] < 0.5  # m: the keyframe nearest to the first wheel message
+        assert 1.0 < path_m[-1] < 200.0  # m, after a kilometre by nominal wheels
+
+
+def test_filtered_paths_stay_beside_the_solved_ones(campus: BuiltCampus) -> None:
+    solved = {(one.vehicle, one.boot_id): one for one in newest_map(campus.data).trajectories}
+    for path in LoggedMeasurements(DataDirectory(campus.data)).paths("filtered"):
+        assert np.median(on_path_m(path, solved[path.vehicle, path.boot_id])) < 5.0  # m: what fixes are off by
+
+
+def test_every_judged_fix_is_told_with_its_verdict(campus: BuiltCampus) -> None:
+    fixes = LoggedMeasurements(DataDirectory(campus.data)).fixes()
+    with closing(McapLog(campus.data / "log")) as log:
+        verdicts = logged_verdicts(log)
+    assert len(fixes) == len(verdicts) > 100
+    assert sum(one.accepted for one in fixes) == sum(one.accepted for one in verdicts)
+    assert all(one.nis is not None and one.nis > (one.limit or 0.0) for one in fixes if one.reason == "outside gate")
+
+
+def newest_map(data: Path) -> SolvedMap:
+    with closing(McapLog(data / "log")) as log:
+        return logged_maps(log)[-1]
+
+
+def on_path_m(path: DrivenPath, solved: TrajectorySolved) -> Floats:
+    """How far a path is from the solved one at its times."""
+    within = (path.stamp_ns >= solved.stamp_ns[0]) & (path.stamp_ns <= solved.stamp_ns[-1])
+    at = np.column_stack([np.interp(path.stamp_ns[within], solved.stamp_ns, solved.pose[:, axis]) for axis in (0, 1)])
+    return np.asarray(np.hypot(*(path.point_m[within] - at).T), dtype=np.float64)
 
 
 def test_with_anchors_the_map_is_anchored_without_being_asked(campus: BuiltCampus) -> None:

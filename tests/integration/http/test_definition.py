@@ -40,6 +40,7 @@ DEFINITION = schemathesis.openapi.from_dict(
     api_document(corrections_definition(), tuple(LAYERS.values()), base_url="http://127.0.0.1")
 )
 OPERATIONS = {found.ok().label: found.ok() for found in DEFINITION.get_all_operations() if isinstance(found, Ok)}
+OPERATIONS.pop("GET /events")  # has no end: tests/contract/http has its own for it
 BOTH = [GenerationMode.POSITIVE, GenerationMode.NEGATIVE]
 SHORT, LONG = 6, 100  # requests of an operation
 

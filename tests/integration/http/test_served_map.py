@@ -121,7 +121,11 @@ def test_a_label_by_http_is_in_the_log_as_one_by_command(tmp_path: Path) -> None
     with served_map(tmp_path, database=geopackage_line(path), web=web, data=data) as served:
         assert sent(served, "POST", "/anchors", issued, LABEL) == 201
         assert sent(served, "POST", "/anchors", issued, LABEL) == 200
+        (label,) = labels_in_force(served, issued)
+        assert (label["anchor"], label["position"], label["sigma_m"]) == ("a9", [151.184, -33.893], 0.1)
+        assert label["stamp_ns"] > 0
         assert sent(served, "DELETE", "/anchors/a9?reason=wrong", issued) == 200
+        assert labels_in_force(served, issued) == []
         assert sent(served, "DELETE", "/anchors/other", issued) == 404
         assert sent(served, "POST", "/anchors", issued, {**LABEL, "lat_deg": 50.0}) == 400
         assert sent(served, "POST", "/anchors", "tp_forged", LABEL) == 401
@@ -131,6 +135,13 @@ def test_a_label_by_http_is_in_the_log_as_one_by_command(tmp_path: Path) -> None
     (anchor,) = trigpoint("anchors", "list", "--data", data, "--json").answer["anchors"]["items"]
     assert (anchor["anchor"], anchor["lat_deg"], anchor["in_force"]) == ("a9", -33.893, False)
     assert anchor["retracted"] == {"author": "ann", "reason": "wrong"}
+
+
+def labels_in_force(served: ServedMap, token: str) -> list[Any]:
+    request = urllib.request.Request(f"{served.url}/labels", headers={"Authorization": f"Bearer {token}"})
+    with urllib.request.urlopen(request, timeout=30.0) as answer:
+        found: list[Any] = json.load(answer)["labels"]
+        return found
 
 
 def sent(served: ServedMap, method: str, path: str, token: str, body: object = None) -> int:
@@ -149,6 +160,18 @@ def test_a_process_told_to_stop_ends_well(tmp_path: Path, database: Path) -> Non
     with served_map(tmp_path, database=geopackage_line(database)) as served:
         served.popen.terminate()
         assert served.popen.wait(30.0) == 0
+
+
+def test_who_listens_does_not_hold_up_the_end(tmp_path: Path, database: Path) -> None:
+    with (
+        served_map(tmp_path, database=geopackage_line(database)) as served,
+        urllib.request.urlopen(f"{served.url}/events", timeout=30.0) as listening,
+    ):
+        assert listening.headers["content-type"].startswith("text/event-stream")
+        assert listening.readline() == b"event: version\n"
+        served.popen.terminate()
+        assert served.popen.wait(4.0) == 0  # s: less than requests under way are given
+        assert listening.read().endswith(b"\n\n")
 
 
 def test_a_process_without_a_database_waits_for_one(tmp_path: Path) -> None:

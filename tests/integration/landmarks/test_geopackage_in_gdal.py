@@ -32,6 +32,7 @@ LAYERS = {
     "current_anchors": "Point",
     "map_versions": None,
     "image_offsets": None,
+    "label_gains": None,
     "log_checkpoints": None,
 }
 

@@ -60,7 +60,7 @@ def test_no_number_has_less_than_64_bits(made: str) -> None:
     kinds = scalars(
         made,
         "SELECT DISTINCT data_type FROM information_schema.columns WHERE table_schema = 'public' AND table_name IN "
-        "('landmarks', 'landmark_history', 'trajectories', 'anchors', 'image_offsets', 'map_versions')",
+        "('landmarks', 'landmark_history', 'trajectories', 'anchors', 'image_offsets', 'label_gains', 'map_versions')",
     )
     assert set(kinds) == {"USER-DEFINED", "bigint", "boolean", "double precision", "text"}
 
@@ -76,13 +76,13 @@ def test_opened_again_nothing_changes(made: str) -> None:
 
 def test_a_newer_schema_is_refused_with_both_versions(made: str) -> None:
     executed(made, "UPDATE alembic_version SET version_num = '9999'")
-    with pytest.raises(InputError, match="schema 9999 is newer than 0002"):
+    with pytest.raises(InputError, match="schema 9999 is newer than 0003"):
         PostgisStore(made)
 
 
 def test_a_newer_schema_is_refused_for_reading_too(made: str) -> None:
     executed(made, "UPDATE alembic_version SET version_num = '9999'")
-    with pytest.raises(InputError, match="schema 9999 is newer than 0002"):
+    with pytest.raises(InputError, match="schema 9999 is newer than 0003"):
         PostgisStore(made, read_only=True)
 
 

@@ -16,6 +16,7 @@ from landmark_maps.examples import (
     closing,
     frame,
     label,
+    label_gain,
     logged,
     solved_landmark,
     solved_map,
@@ -204,6 +205,14 @@ def test_a_landmark_both_named_and_removed_is_removed() -> None:
     first = changed(1, [solved_landmark("L1", 1.0, 0.0)])
     second = delta(2, [solved_landmark("L1", 2.0, 0.0, map_version=2)], removed=("L1", "never there"), held=first)
     assert (second.opened, second.closed) == ((), ("L1",))
+
+
+def test_what_a_label_would_tell_is_kept_of_landmarks_whose_terms_are_numbers() -> None:
+    said = replace(label_gain(["L1", "L2"]), shared_m4=np.array([[np.nan, 0.0, 1.0], [0.5, 0.1, 0.25]]))
+    (version,) = solved_versions(logged([said, closing(1, 0)]))
+    (row,) = map_change(version, frame=frame(), labels={}, valid={}).label_gains
+    assert json.loads(row.landmarks_json) == ["L2"]
+    assert json.loads(row.terms_json) == [[0.04, 0.01, 0.09, 0.5, 0.1, 0.25]]
 
 
 places_m = st.floats(-20_000.0, 20_000.0)

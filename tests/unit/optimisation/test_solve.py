@@ -8,9 +8,10 @@ import pytest
 from numpy.typing import NDArray
 
 from solved_worlds.examples import CENTRE_M, FRAME, Lap, World, labelled, mismatched, world
+from trigpoint.anchoring.association import Assignment
+from trigpoint.anchoring.labels import labels_of
 from trigpoint.events.corrected import AnchorLabelled
 from trigpoint.events.estimated import FixJudged
-from trigpoint_optimisation.core.anchoring import Assignment, labels_of
 from trigpoint_optimisation.core.fleet import solved_state
 from trigpoint_optimisation.core.solve import Solution, solve_map, usable_fixes
 from trigpoint_optimisation.core.stages import Solved, anchored, full_graph, in_silence, solve_fleet

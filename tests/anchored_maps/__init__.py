@@ -1,0 +1,1 @@
+"""Labels and what is known of the landmarks they may be of."""
