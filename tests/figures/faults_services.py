@@ -36,6 +36,7 @@ Compared = Callable[[Outcome, Outcome], Sequence[str]]
 @lru_cache(maxsize=1)
 def runs(folder: Path) -> tuple[Outcome, Outcome]:
     """The same drives and labels through a fleet whose services are killed, and through one that is left in peace."""
+    folder = folder / "services-killed"  # of its own: all figures of the group work in one folder
     campus = small_campus(folder / "campus")
     killing = Killing(services=FOLLOWERS, times_each=KILLS, within_s=KILLED_WITHIN_S)
     killed, whole = fleet_of(folder / "killed"), fleet_of(folder / "whole")
