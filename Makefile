@@ -7,6 +7,7 @@ CONSTRAINTS := constraints.txt
 VIEWER := services/trigpoint_landmarks/viewer
 VIEWER_PACKAGES := $(VIEWER)/node_modules/.package-lock.json
 VIEWER_BUILT := $(VIEWER)/dist/index.html
+WORKERS ?= 2
 PYTEST := $(BIN)/pytest $(if $(CI),--forbid-skipped=postgis --forbid-skipped=browser)
 
 .DEFAULT_GOAL := help
@@ -22,7 +23,7 @@ demo: $(INSTALLED) ## a simulated campus from raw logs to a georeferenced map, w
 viewer: $(VIEWER_BUILT) ## the page at /viewer/ of the HTTP service, built by npm
 
 test: $(DEVELOPED) system-tools viewer-where-possible ## all tests except the slow ones
-	$(PYTEST) -m "not slow"
+	$(PYTEST) --numprocesses $(WORKERS) --dist loadgroup -m "not slow"
 
 test-all: $(DEVELOPED) system-tools viewer-where-possible ## all tests
 	$(PYTEST)

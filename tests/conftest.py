@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 REPOSITORY = Path(__file__).resolve().parent.parent
 RECORDED_DRIVES = REPOSITORY.parent / "shared" / "data"
 
+COMPUTING = frozenset(("unit", "contract", "architecture"))  # folders
+
 pytest_plugins = ["pytester"]
 
 
@@ -47,6 +49,15 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         metavar="MARK",
         help="a skipped test with this mark, and any file skipped whole, counts as failed; may be given more than once",
     )
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """For several workers: the files of tests that only compute go to whoever is free; all others, which start processes
+    and look at the clock, stay with one worker, one after the other."""
+    if config.pluginmanager.hasplugin("xdist"):
+        for item in items:
+            only_computes = not COMPUTING.isdisjoint(item.path.parts)
+            item.add_marker(pytest.mark.xdist_group(str(item.path) if only_computes else "processes"))
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
