@@ -22,17 +22,18 @@ class SolvedAgain:
     token: str
 
 
-def solved_campus(data: Path, raw: Path) -> None:
+def solved_campus(folder: Path) -> Path:
     """A data directory with the small campus's log and its first map version. Raises AssertionError."""
-    written = write_small_campus(raw)
+    data, written = folder / "data", write_small_campus(folder / "raw")
     assert trigpoint("ingest", *written.logs, "--data", data).status == 0
     assert trigpoint("anchors", "import", str(written.anchors), "--data", data).status == 0
     assert trigpoint("build", "--data", data).status == 0
+    return data
 
 
 @contextmanager
 def solving(folder: Path) -> Iterator[SolvedAgain]:
-    """The processes at work on the small campus until the end."""
+    """The processes at work, until the end, on the small campus that was solved in the folder."""
     port, health_port = free_ports(2)
     tokens = folder / "tokens.json"
     web = {"port": port, "token_file": str(tokens), "look_s": 0.2}
@@ -41,7 +42,6 @@ def solving(folder: Path) -> Iterator[SolvedAgain]:
     fleet = fleet_in(folder, toml + "\n".join(lines) + "\n")
     fleet = replace(fleet, ports={**fleet.ports, "http": health_port})
     _, token = issue_token(tokens, "ann", Scope.LABEL, now_s=0)
-    solved_campus(fleet.data, folder / "raw")
     with trigpoint_process(folder, "up", "--config", fleet.config) as process:
         fleet.wait_ready(*SERVICES)
         yield SolvedAgain(f"http://127.0.0.1:{port}", token)

@@ -13,7 +13,7 @@ from viewed_maps.labelling import (
     submitted,
     version_shown,
 )
-from viewed_maps.solving import solving
+from viewed_maps.solving import solved_campus, solving
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -26,8 +26,10 @@ def viewer_built() -> None:
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory, viewer_built: None) -> Iterator[Viewed]:
+    folder = tmp_path_factory.mktemp("solving")
+    solved_campus(folder)
     with (
-        solving(tmp_path_factory.mktemp("solving")) as served,
+        solving(folder) as served,
         chromium() as browser,
         viewed(browser, reduced_motion="reduce") as found,
     ):

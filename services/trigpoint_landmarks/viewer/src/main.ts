@@ -51,11 +51,11 @@ async function open(): Promise<void> {
   const box = landmarks.extent.spatial?.bbox[0] ?? WORLD;
   const view = new MapView(places.canvas, api, box, version);
   viewer = new Viewer(api, store, view, speech, places, token);
-  const refreshed = viewer.refresh();
+  const begun = viewer.begin();
   await view.drawn;
   performance.mark("first-picture");
   places.canvas.dataset.drawn = "true";
-  await refreshed;
+  await begun;
   await viewer.offerRasters();
 }
 

@@ -70,6 +70,12 @@ export class Viewer {
     this.layers.offerRasters(rasters);
   }
 
+  /** Shows the newest version, and what is under way to the next. */
+  async begin(): Promise<void> {
+    await this.refresh();
+    await this.labelling.resume();
+  }
+
   /** Shows a version again as the service has it: somebody else may ask now. */
   async refresh(): Promise<void> {
     const { shown } = this.store.state;

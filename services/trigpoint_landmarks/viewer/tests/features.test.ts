@@ -59,12 +59,12 @@ describe("residual arrows", () => {
 
 describe("a label that might be", () => {
   it("shows its gate and the tie", () => {
-    expect(prospect(SYDNEY, ASSOCIATION).features.map((one) => one.properties["part"])).toEqual(["gate", "tie"]);
+    expect(prospect(SYDNEY, ASSOCIATION).features.map((one) => one.properties.part)).toEqual(["gate", "tie"]);
   });
 
   it("shows the nearest landmark that is refused as what it is", () => {
     const refused = { ...ASSOCIATION, landmark: "" };
-    expect(prospect(SYDNEY, refused).features.map((one) => one.properties["part"])).toEqual(["gate", "rival"]);
+    expect(prospect(SYDNEY, refused).features.map((one) => one.properties.part)).toEqual(["gate", "rival"]);
   });
 });
 
@@ -72,7 +72,7 @@ describe("suggestions", () => {
   it("are the larger the more they bring, the best one the largest", () => {
     const one = (rank: number, gain: number) =>
       ({ rank, landmark: `L${rank}`, position: SYDNEY, variance_reduction_m2: gain }) as Suggestion;
-    const radii = suggestionRings([one(1, 4), one(2, 1)]).features.map(({ properties }) => properties["radius"]);
+    const radii = suggestionRings([one(1, 4), one(2, 1)]).features.map(({ properties }) => properties.radius);
     expect(radii).toEqual([25, 17]);
   });
 });

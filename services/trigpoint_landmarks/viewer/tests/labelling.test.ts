@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { distanceM } from "../src/geo.ts";
-import { anchorId, settled } from "../src/labelling/awaited.ts";
+import { anchorId, settled, underway } from "../src/labelling/awaited.ts";
 import { EMPTY_DRAFT, freeName, imageAt, labelOf, nudged, obstacle } from "../src/labelling/draft.ts";
 import type { AerialImage, AnchorFeature, LonLat } from "../src/wire.ts";
 
@@ -84,6 +84,12 @@ describe("the arrow keys", () => {
 
 describe("what is awaited", () => {
   const label = { what: "label" as const, anchor: "a", image: "i", since: 3 };
+
+  it("is, of what the log has, whatever the version does not have yet or has still", () => {
+    const still = { ...anchor("b"), properties: { anchor: "b", image: "" } as AnchorFeature["properties"] };
+    expect(underway([label], [still], 3)).toEqual([label, { what: "retraction", anchor: "b", image: "", since: 3 }]);
+    expect(underway([label], [anchor("a@i")], 3)).toEqual([]);
+  });
 
   it("arrives with the first later version that has the anchor", () => {
     expect(settled([label], 4, [anchor(anchorId(label))]).arrived).toHaveLength(1);

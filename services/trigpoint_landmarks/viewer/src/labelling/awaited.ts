@@ -13,6 +13,23 @@ export function anchorId({ anchor, image }: { anchor: string; image: string }): 
   return image ? `${anchor}@${image}` : anchor;
 }
 
+/** What stands in the log and not in a version yet: labels it does not have, and anchors that are labels no more. */
+export function underway(
+  labels: readonly { anchor: string; image: string }[],
+  anchors: readonly AnchorFeature[],
+  version: number,
+): Awaited[] {
+  const placed = anchors.filter((one) => one.geometry !== null);
+  const ids = new Set(placed.map((one) => one.id));
+  const inForce = new Set(labels.map(anchorId));
+  const fresh = labels.filter((label) => !ids.has(anchorId(label)));
+  const gone = placed.filter((one) => !inForce.has(String(one.id))).map((one) => one.properties);
+  return [
+    ...fresh.map(({ anchor, image }): Awaited => ({ what: "label", anchor, image, since: version })),
+    ...gone.map(({ anchor, image }): Awaited => ({ what: "retraction", anchor, image, since: version })),
+  ];
+}
+
 export interface Arrived {
   awaited: Awaited;
   /** What became of the anchor; null where it was retracted. */

@@ -7,7 +7,7 @@ import type { Speech } from "../speech.ts";
 import type { Store } from "../state.ts";
 import { metres } from "../text.ts";
 import type { Association, LonLat } from "../wire.ts";
-import { type Arrived, type Awaited, settled } from "./awaited.ts";
+import { type Arrived, type Awaited, settled, underway } from "./awaited.ts";
 import { type Draft, EMPTY_DRAFT, freeName, imageAt, labelOf, obstacle } from "./draft.ts";
 import { LabelMarker } from "./marker.ts";
 
@@ -34,6 +34,14 @@ export class Labelling {
   ) {
     this.marker = new LabelMarker(view, (position) => this.place(position));
     store.on(["anchors", "shown"], ({ shown }) => void this.settle(shown));
+  }
+
+  /** Takes up what was submitted before this page was opened; the newest version is the one that is shown. */
+  async resume(): Promise<void> {
+    const { anchors, shown } = this.store.state;
+    if (shown === null) return;
+    this.awaited = underway(await this.api.labels(), anchors, shown);
+    this.tell();
   }
 
   /** Told whenever anything of this is different. */

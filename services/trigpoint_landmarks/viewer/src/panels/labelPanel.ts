@@ -156,7 +156,7 @@ export class LabelPanel {
     this.longitude.value = draft.position ? draft.position[0].toFixed(8) : "";
     if (document.activeElement !== this.anchor) this.anchor.value = draft.anchor;
     this.preview.hidden = !draft.position;
-    this.preview.dataset["tied"] = String(Boolean(association?.landmark));
+    this.preview.dataset.tied = String(Boolean(association?.landmark));
     if (association) fill(this.preview, verdict(association), reasons(association));
     else fill(this.preview, el("p", {}, trouble || "Asking what it would be tied to…"));
     this.renderProgress();

@@ -1,4 +1,5 @@
 /** The legend, in which every entry can be switched on and off. */
+import licence from "../../node_modules/maplibre-gl/LICENSE.txt?url";
 import { said } from "../api.ts";
 import { el, fill } from "../dom.ts";
 import { LAYER_GROUPS, type LayerGroup, type Swatch } from "../map/layerGroups.ts";
@@ -39,6 +40,12 @@ interface Entry {
   shown: boolean;
 }
 
+/** Whose work draws the map, with its licence, which has to come along. */
+function credit(): HTMLElement {
+  const link = el("a", { href: licence, target: "_blank", rel: "noopener" }, "MapLibre GL JS");
+  return el("p", { class: "credit" }, "Drawn with ", link, ".");
+}
+
 export class LayersPanel {
   readonly element: HTMLElement;
   private readonly boxes = new Map<string, HTMLInputElement>();
@@ -51,7 +58,7 @@ export class LayersPanel {
     const rows = LAYER_GROUPS.map((group) =>
       this.row(group, swatch(group.swatch, group.colour), this.below(group, store)),
     );
-    this.element = el("div", { class: "layers" }, el("h2", {}, "Layers"), this.rasters, ...rows);
+    this.element = el("div", { class: "layers" }, el("h2", {}, "Layers"), this.rasters, ...rows, credit());
   }
 
   /** Shows or hides a group, and says so in its box. */

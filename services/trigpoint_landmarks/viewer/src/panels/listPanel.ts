@@ -36,6 +36,7 @@ export class ListPanel {
   private readonly list = el("ul", { class: "rows" });
   private rows: readonly Row[] = [];
   private open = false;
+  private asked = 0;
 
   constructor(
     private readonly api: MapApi,
@@ -70,11 +71,15 @@ export class ListPanel {
   }
 
   private async load(): Promise<void> {
+    this.asked += 1;
+    const number = this.asked;
     try {
-      this.rows = await this.found(this.what.value);
+      const rows = await this.found(this.what.value);
+      if (number !== this.asked) return; // something else was asked for since
+      this.rows = rows;
       this.render();
     } catch (error) {
-      this.count.textContent = said(error);
+      if (number === this.asked) this.count.textContent = said(error);
     }
   }
 

@@ -14,7 +14,7 @@ export function statusBar(store: Store, speech: Speech): HTMLElement {
   let toldTitle = "";
   const show = () => {
     const words = spoken(store.state.link, Date.now());
-    pill.dataset["tone"] = words.tone;
+    pill.dataset.tone = words.tone;
     if (title.textContent !== words.title) title.textContent = words.title;
     if (detail.textContent !== words.detail) detail.textContent = words.detail;
     if (toldTitle && toldTitle !== words.title) speech.say(`${words.title}: ${words.detail}`);
