@@ -52,8 +52,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """For several workers: the files of tests that only compute go to whoever is free; all others, which start processes
-    and look at the clock, stay with one worker, one after the other."""
+    """For several workers: files of tests that only compute go to whoever is free; all others, which start processes
+    and look at the clock, stay with one worker, in order."""
     if config.pluginmanager.hasplugin("xdist"):
         for item in items:
             only_computes = not COMPUTING.isdisjoint(item.path.parts)
