@@ -38,6 +38,7 @@ from trigpoint_optimisation.whole_solve import WholeSolve, WholeSolver
 
 BATCH = 1000  # events taken at a time
 IDLE_S = 0.02  # between two looks at a log without news
+SOLVING = 2  # times its limit the graph may grow while the whole map is being solved, which may take long
 METHOD = "incremental"
 ODOMETRY_STREAM = STREAM_PATTERNS[OdometryCorrected]
 CORRECTIONS = (AnchorLabelled, AnchorRetracted, DriveExcluded, DriveIncluded)
@@ -77,6 +78,11 @@ class LiveOptimisation:
     def ready(self) -> bool:
         """Whether everything in the log when it began is taken in."""
         return self._ready
+
+    @property
+    def pose_count(self) -> int:
+        """How many poses the growing graph has."""
+        return 0 if self._fleet is None else self._fleet.map.pose_count
 
     def run(self, stop: threading.Event) -> None:
         """Works until told to stop. Raises AppendFailed, LogDamaged, ServiceError where the solving process died."""
@@ -254,6 +260,8 @@ class LiveOptimisation:
             found = self._solver.result()
             if found is not None:
                 self._take_whole(found)
+            elif self.pose_count > SOLVING * self._settings.live.pose_limit:
+                self._begin_again()
             return
         reason = self._reason_to_solve()
         if reason:
@@ -294,7 +302,7 @@ class LiveOptimisation:
         if found.refusal:
             logger.warning("the whole map cannot be solved: %s", found.refusal)
             self._correction_s = time.monotonic() + self._settings.live.solve_interval_s  # with more data perhaps
-            if self._fleet.map.pose_count > self._settings.live.pose_limit:
+            if self.pose_count > self._settings.live.pose_limit:
                 self._begin_again()
             return
         self._append_version(found.events, stamp_ns=found.stamp_ns)

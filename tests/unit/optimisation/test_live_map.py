@@ -237,6 +237,28 @@ def test_where_no_whole_map_can_be_solved_a_full_graph_begins_anew_from_the_newe
     assert len(newest(log).landmarks) >= 36
 
 
+class EndlessSolver(SolverInPlace):
+    """One that never comes to an end."""
+
+    def result(self) -> None:
+        return None
+
+
+def test_while_the_whole_map_is_being_solved_the_graph_does_not_grow_without_end() -> None:
+    log, rows = pinned(), car_rows()
+    live = LiveSettings(version_interval_s=0.0, settle_s=NEVER_S, solve_interval_s=0.0, pose_limit=40)
+    settings, instruments = SolveSettings(live=live), Instruments("optimisation")
+    log.append("filtering", accepted(rows))
+    log.append("veh-car", rows)
+    held: list[int] = []
+    service = LiveOptimisation(log, EndlessSolver(log, settings), settings=settings, instruments=instruments)
+    with closing(service):
+        while service.step():
+            held.append(service.pose_count)
+    assert 2 * live.pose_limit < max(held) < 4 * live.pose_limit  # a look takes in a thousand events
+    assert len(newest(log).landmarks) >= 36
+
+
 def newest_method(log: MemoryLog) -> str:
     methods = [row.envelope.event for row in log.read("optimisation", kinds=(MapSolved,))]
     return methods[-1].method if methods and isinstance(methods[-1], MapSolved) else ""
