@@ -22,6 +22,7 @@ from trigpoint_ingest.settings import IngestSettings
 IDLE_S = 0.002  # between two looks at an empty queue: waiting for each message costs more than the message
 QUIET_S = 0.01  # nothing came for so long: what is there needs not wait for more
 ALONE_S, ALONE_COUNT = 0.02, 4096  # a group under way has the interpreter to itself so long, if no more messages wait
+LARGE_BYTES = 1024 * 1024  # to be taken at once, however few messages they are
 CLAIM_LOOK_S = 1.0  # between two looks at others' claims
 
 logger = logging.getLogger(__name__)
@@ -85,6 +86,8 @@ class IngestService:
         now_s, come = self._now_s(), self._reception.waiting + self._gathered
         if come != self._come:
             self._come, self._heard_s = come, now_s
+        if self._reception.waiting_bytes + self._journal.pending_bytes >= LARGE_BYTES:
+            return False
         if self._group is None:
             return come < self._settings.live_batch_count and not self._waited_enough(now_s)
         is_slow = now_s - self._begun_s > self._settings.slow_append_s

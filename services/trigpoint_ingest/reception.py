@@ -65,6 +65,11 @@ class Reception:
         return sum(subscription.waiting for subscription in self._subscriptions)
 
     @property
+    def waiting_bytes(self) -> int:
+        """How large they are."""
+        return sum(subscription.waiting_bytes for subscription in self._subscriptions)
+
+    @property
     def arrived(self) -> int:
         """How many messages were taken and not handed on."""
         return self._arrived_count

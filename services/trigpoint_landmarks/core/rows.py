@@ -30,6 +30,7 @@ from trigpoint_landmarks.core.versions import SolvedVersion
 
 Floats = NDArray[np.float64]
 UNSEEN = provenance_json(())
+HELD_LENGTH = 128  # characters of provenance that are kept as they are
 Labels = Mapping[tuple[str, str], AnchorLabelled]  # by name and image
 
 
@@ -77,7 +78,9 @@ def make_valid(valid: dict[str, Landmark], change: MapChange) -> None:
 
 
 def held(row: Landmark) -> Landmark:
-    """A row as it is kept in memory: a fingerprint in place of what saw it, which is most of it and grows for ever."""
+    """A row as it is kept in memory: a fingerprint in place of what saw it, which grows for ever, once it is long."""
+    if len(row.provenance) <= HELD_LENGTH:
+        return row
     return row._replace(provenance=blake2b(row.provenance.encode(), digest_size=16).hexdigest())
 
 

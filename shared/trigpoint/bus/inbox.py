@@ -35,6 +35,11 @@ class Inbox(Generic[ItemT]):
         """How many messages wait."""
         return self._held
 
+    @property
+    def held_bytes(self) -> int:
+        """How many bytes they are."""
+        return self._held_bytes
+
     def offer(self, item: ItemT, *, count: int = 1, size_bytes: int = 0) -> None:
         """The item of `count` messages queued, or lost if the inbox is full; without effect once closed."""
         if self._closed.is_set():

@@ -31,6 +31,11 @@ class MemorySubscription:
         """How many messages wait to be received."""
         return self._inbox.held
 
+    @property
+    def waiting_bytes(self) -> int:
+        """How large they are."""
+        return self._inbox.held_bytes
+
     def matches(self, key: str) -> bool:
         """Whether messages on this key belong here."""
         return key_matches(self._expression, key)

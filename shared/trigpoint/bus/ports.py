@@ -125,6 +125,10 @@ class Subscription(Protocol):
     def waiting(self) -> int:
         """How many messages wait to be received."""
 
+    @property
+    def waiting_bytes(self) -> int:
+        """How many bytes those take that wait, as far as they were not looked at yet."""
+
     def receive(self, timeout_s: float) -> BusMessage | None:
         """The next message, or None if none came within `timeout_s` or the subscription is closed."""
 

@@ -102,6 +102,11 @@ class ZenohSubscription:
         """How many messages wait to be received."""
         return self._inbox.held + self._gathered + len(self._unpacked) + sum(len(run.run) for run in self._runs)
 
+    @property
+    def waiting_bytes(self) -> int:
+        """How large those are that were not looked at yet."""
+        return self._inbox.held_bytes
+
     def receive(self, timeout_s: float) -> BusMessage | None:
         """The next message, or None if none came within `timeout_s` or the subscription is closed."""
         if not self._unpacked:

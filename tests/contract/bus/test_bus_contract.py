@@ -177,6 +177,7 @@ def test_what_waits_is_counted(pair: tuple[Bus, Bus]) -> None:
     publisher.publish_all([message("t/a", sequence) for sequence in range(3)])
     until_waiting(subscription, 3)
     assert subscription.waiting == 3
+    assert subscription.waiting_bytes >= 3 * len(message("t/a").payload)
 
 
 def test_a_claim_is_seen_by_both_sessions_until_it_is_released(pair: tuple[Bus, Bus]) -> None:

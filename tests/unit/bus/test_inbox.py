@@ -48,7 +48,7 @@ def test_what_waits_is_taken_until_it_is_enough() -> None:
         inbox.offer(item, count=2, size_bytes=5)
     assert inbox.take_more(count=3, size_bytes=100) == ["a", "b"]
     assert inbox.take_more(count=100, size_bytes=5) == ["c"]
-    assert (inbox.take_more(count=0, size_bytes=5), inbox.held) == ([], 2)
+    assert (inbox.take_more(count=0, size_bytes=5), inbox.held, inbox.held_bytes) == ([], 2, 5)
 
 
 def test_what_was_taken_together_makes_room_again() -> None:
