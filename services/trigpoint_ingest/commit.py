@@ -107,9 +107,9 @@ class GroupCommit:
         """The run as it is published: each class of events on its key, where somebody listens to that. A schema no
         row has may be anything."""
         for number, schema in enumerate(run.schemas):
-            kind = event_class(schema)
+            kind = event_class(schema) if (run.schema_of_row == number).any() else None
             key = "" if kind is None else observation_key(run.source, kind, root=self._settings.root)
-            if key and is_heard(key) and (run.schema_of_row == number).any():
+            if key and is_heard(key):
                 yield BusRun(key, 1, of_schema(run, number))
 
 

@@ -16,8 +16,10 @@ from trigpoint.bus.memory_bus import MemoryBus, MemoryExchange
 from trigpoint.bus.ports import Bus, BusMessage, BusRun, Claim, Content, Queryable, Replies, Subscription
 from trigpoint.bus.zenoh_bus import ZenohBus, ZenohSettings
 from trigpoint.errors import AppendFailed, LogDamaged, ServiceError
+from trigpoint.events.codec import schema_name
 from trigpoint.events.envelope import Envelope, EventIdentity, LogPosition
 from trigpoint.events.keys import key_expression
+from trigpoint.events.mapped import MapSolved
 from trigpoint.events.observed import EventRefused, GnssFixReceived, Observed
 from trigpoint.logs.mcap_log import McapLog
 from trigpoint.logs.memory_log import MemoryLog
@@ -336,6 +338,19 @@ def test_a_message_of_no_one_is_kept_aside(rows: Rows) -> None:
     (kept,) = [row.envelope.event for row in log.read("refused")]
     assert isinstance(kept, EventRefused)
     assert kept.reason == "unidentified"
+    bus.close()
+
+
+def test_a_message_in_a_schema_no_vehicle_sends_keeps_none_of_those_beside_it_back(rows: Rows) -> None:
+    bus, log = MemoryBus(), MemoryLog()
+    with IngestService(log, bus, SETTINGS) as service:
+        send(rows[:100], bus)
+        drain(service)
+        send(rows[100:200], bus)
+        bus.publish(replace(live(rows[200]), schema_name=schema_name(MapSolved)))
+        drain(service)
+    assert stored(log) == rows[:200]
+    assert len(list(log.read("refused"))) == 1
     bus.close()
 
 
