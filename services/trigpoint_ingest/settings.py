@@ -14,10 +14,11 @@ class IngestSettings:
     """`fleet` names the only vehicles accepted, None accepts all that describe themselves. `vehicles` names those
     this process takes, where several share a fleet; without any it takes them all.
 
-    Events of files are appended `batch_count` at a time, those that come live `live_batch_count` or `batch_bytes`, or
-    what there is after `batch_s`; while a group waits for the disk, `pending_count` more messages or `pending_bytes`
-    of payload are taken, then none. A live message waits up to `gap_timeout_s` for an earlier one, with at most
-    `held_limit` others of its drive. Of a refused payload `refused_payload_limit` bytes are kept.
+    Events of files are appended `batch_count` at a time, those that come live `live_batch_count` (of the vehicles that
+    wait longest) or `batch_bytes`, or what there is after `batch_s` or once nothing more comes; while a group waits for
+    the disk, `pending_count` more messages or `pending_bytes` of payload are taken, then none. A live message waits up
+    to `gap_timeout_s` for an earlier one, with at most `held_limit` others of its drive. Of a refused payload
+    `refused_payload_limit` bytes are kept.
 
     A payload has at most `message_limit_bytes`. A vehicle may send `vehicle_rate_hz` messages a second, and
     `vehicle_burst` at once. At most `drive_limit` drives are known, and

@@ -84,6 +84,16 @@ def all_received(subscription: Subscription, count: int) -> list[BusMessage]:
     return [item for item in received if item is not None]
 
 
+def on_two_keys() -> list[BusMessage]:
+    """Messages on t/a and t/b in turn."""
+    return [message(f"t/{'ab'[sequence % 2]}", sequence) for sequence in range(SMALL_INBOX)]
+
+
+def assert_each_key_in_order(received: list[BusMessage], sent: list[BusMessage]) -> None:
+    for key in ("t/a", "t/b"):
+        assert [item for item in received if item.key == key] == [item for item in sent if item.key == key]
+
+
 def test_a_message_arrives_with_everything_it_was_sent_with(pair: tuple[Bus, Bus]) -> None:
     publisher, listener = pair
     subscription = listener.subscribe("t/v1/veh/*/obs/*")
@@ -106,11 +116,10 @@ def test_messages_published_together_arrive_one_by_one_each_key_in_order(pair: t
     publisher, listener = pair
     subscription = listener.subscribe("t/*")
     until_heard(publisher, "t/a")
-    sent = [message(f"t/{'ab'[sequence % 2]}", sequence) for sequence in range(SMALL_INBOX)]
+    sent = on_two_keys()
     publisher.publish_all(sent)
     received = all_received(subscription, len(sent))
-    assert [item for item in received if item.key == "t/a"] == sent[0::2]
-    assert [item for item in received if item.key == "t/b"] == sent[1::2]
+    assert_each_key_in_order(received, sent)
 
 
 def test_what_is_published_together_can_be_received_as_runs(pair: tuple[Bus, Bus]) -> None:
@@ -145,28 +154,26 @@ def test_runs_of_several_keys_keep_each_keys_order(pair: tuple[Bus, Bus]) -> Non
     publisher, listener = pair
     subscription = listener.subscribe("t/*")
     until_heard(publisher, "t/a")
-    sent = [message(f"t/{'ab'[sequence % 2]}", sequence) for sequence in range(SMALL_INBOX)]
+    sent = on_two_keys()
     for item in sent:
         publisher.publish(item)
     until_waiting(subscription, len(sent))
     received = received_in_runs(subscription, len(sent))
-    assert [item for item in received if item.key == "t/a"] == sent[0::2]
-    assert [item for item in received if item.key == "t/b"] == sent[1::2]
+    assert_each_key_in_order(received, sent)
 
 
 def test_what_is_left_of_runs_can_be_received_one_by_one(pair: tuple[Bus, Bus]) -> None:
     publisher, listener = pair
     subscription = listener.subscribe("t/*")
     until_heard(publisher, "t/a")
-    sent = [message(f"t/{'ab'[sequence % 2]}", sequence) for sequence in range(SMALL_INBOX)]
+    sent = on_two_keys()
     for item in sent:
         publisher.publish(item)
     until_waiting(subscription, len(sent))
     received = received_in_runs(subscription, 1)
     assert subscription.waiting == len(sent) - len(received)
     received += all_received(subscription, len(sent) - len(received))
-    assert [item for item in received if item.key == "t/a"] == sent[0::2]
-    assert [item for item in received if item.key == "t/b"] == sent[1::2]
+    assert_each_key_in_order(received, sent)
     assert subscription.waiting == 0
 
 
