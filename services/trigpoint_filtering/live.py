@@ -66,7 +66,7 @@ class LiveFiltering:
         self._backlog = Backlog(self._instruments)
         self._closed = False
         self.ready = False
-        self._subscription = bus.subscribe(f"{root}/{KEY_VERSION}/veh/*/obs/**")
+        self._news = bus.news(f"{root}/{KEY_VERSION}/veh/*/obs/**")
 
     def run(self, stop: threading.Event) -> None:
         """Works until told to stop. Raises AppendFailed when the log cannot be written: then it must stop."""
@@ -79,11 +79,9 @@ class LiveFiltering:
         if self._take():
             return True
         self.ready = True
-        if self._subscription.receive_run(timeout_s) is None:
+        if not self._news.wait(timeout_s):
             return False
         threading.Event().wait(min(GATHER_S, timeout_s))
-        for _ in range(self._subscription.waiting):
-            self._subscription.receive_run(0.0)
         return True
 
     def _take(self) -> bool:
@@ -155,7 +153,7 @@ class LiveFiltering:
         if self._closed:
             return
         self._closed, self.ready = True, False
-        self._subscription.close()
+        self._news.close()
         until_s = time.monotonic() + CLOSE_S
         while self._take():
             if time.monotonic() > until_s:
@@ -174,7 +172,7 @@ class LiveFiltering:
         if error is None:
             self.close()
         else:
-            self._subscription.close()
+            self._news.close()
 
 
 def _is_vehicle(stream: str) -> bool:

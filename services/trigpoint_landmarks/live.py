@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from contextlib import closing
 
-from trigpoint.bus.ports import Bus, Subscription
+from trigpoint.bus.ports import Bus, News
 from trigpoint.errors import DatabaseUnavailable
 from trigpoint.events.keys import DEFAULT_ROOT, KEY_PATTERNS, KEY_VERSION
 from trigpoint.events.mapped import MapSolved
@@ -40,10 +40,10 @@ class LandmarkProjection:
         self._log, self._open_store = log, open_store
         self._settings = settings or LandmarkSettings()
         self._instruments = instruments or Instruments("landmarks")
-        self._subscription: Subscription | None = None
+        self._news: News | None = None
         if bus is not None:
             pattern = KEY_PATTERNS[MapSolved].format(map="*")
-            self._subscription = bus.subscribe(f"{root}/{KEY_VERSION}/{pattern}")
+            self._news = bus.news(f"{root}/{KEY_VERSION}/{pattern}")
         self._ready = False
         self._next_number = 0
         self._backlog = Backlog(self._instruments)
@@ -75,8 +75,8 @@ class LandmarkProjection:
     def close(self) -> None:
         """Nothing more is heard; again: no effect."""
         self._ready = False
-        if self._subscription is not None:
-            self._subscription.close()
+        if self._news is not None:
+            self._news.close()
 
     def _follow(self, store: LandmarkStore, stop: threading.Event) -> None:
         with closing(Projector(self._log, store, refused=self._refuse)) as projector:
@@ -117,7 +117,7 @@ class LandmarkProjection:
 
     def _wait(self, stop: threading.Event) -> None:
         """Until a version is told of or it is time to look at the log."""
-        if self._subscription is None:
+        if self._news is None:
             stop.wait(self._settings.look_s)
         else:
-            self._subscription.receive(self._settings.look_s)
+            self._news.wait(self._settings.look_s)

@@ -9,7 +9,7 @@ from hashlib import blake2b
 from typing import cast
 
 from trigpoint.bus.event_messages import event_message
-from trigpoint.bus.ports import Bus, Subscription
+from trigpoint.bus.ports import Bus, News
 from trigpoint.events.codec import Event
 from trigpoint.events.corrected import (
     AnchorLabelled,
@@ -68,9 +68,7 @@ class LiveOptimisation:
         self._settings = settings or SolveSettings()
         self._instruments = instruments or Instruments("optimisation")
         self._backlog = Backlog(self._instruments)
-        self._subscription: Subscription | None = None
-        if bus is not None:
-            self._subscription = bus.subscribe(f"{self._root}/{KEY_VERSION}/veh/*/obs/**")
+        self._news: News | None = None if bus is None else bus.news(f"{self._root}/{KEY_VERSION}/veh/*/obs/**")
         self._fleet: LiveFleet | None = None
         self._ready = False
 
@@ -94,8 +92,8 @@ class LiveOptimisation:
         """Nothing more is heard or solved; again: no effect."""
         self._ready = False
         self._solver.close()
-        if self._subscription is not None:
-            self._subscription.close()
+        if self._news is not None:
+            self._news.close()
 
     def step(self) -> bool:
         """Whether there was something to do; what is due is appended, and published."""
@@ -116,12 +114,10 @@ class LiveOptimisation:
         return waited
 
     def _wait(self, stop: threading.Event) -> None:
-        if self._subscription is None:
+        if self._news is None:
             stop.wait(IDLE_S)
-            return
-        self._subscription.receive(IDLE_S)
-        while self._subscription.receive(0.0) is not None:
-            pass
+        else:
+            self._news.wait(IDLE_S)
 
     def _begin(self) -> bool:
         frame = pinned_frame(self._log)

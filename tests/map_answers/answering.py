@@ -1,12 +1,12 @@
 """The answering service at work in this process, beside a store that tells of its changes."""
 
-import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from bus_sessions.pairs import free_endpoint
 from trigpoint.bus.ports import Bus
 from trigpoint.bus.zenoh_bus import ZenohBus, ZenohSettings
 from trigpoint.events.keys import ASK_PATTERN, map_key
@@ -38,13 +38,6 @@ class AnsweredStore:
     store: LandmarkStore
     silent: LandmarkStore
     instruments: Instruments
-
-
-def free_endpoint() -> str:
-    """A TCP endpoint on loopback that nobody listens on."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 @contextmanager

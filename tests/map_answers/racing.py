@@ -14,8 +14,9 @@ import numpy as np
 import zenoh
 from numpy.typing import NDArray
 
+from bus_sessions.pairs import free_endpoint
 from landmark_maps.examples import frame
-from map_answers.answering import KEY, MAP, ROOT, SOON_S, free_endpoint
+from map_answers.answering import KEY, MAP, ROOT, SOON_S
 from map_answers.serving import BARE_KEY, SIDE_M
 from trigpoint.bus.ports import Content
 from trigpoint.bus.zenoh_bus import ZenohBus, ZenohSettings, session_config

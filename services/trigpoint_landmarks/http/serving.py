@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import uvicorn
 import uvloop
 
-from trigpoint.bus.ports import Bus, Subscription
+from trigpoint.bus.ports import Bus, News
 from trigpoint.errors import ServiceError
 from trigpoint.events.keys import DEFAULT_ROOT, KEY_PATTERNS, KEY_VERSION
 from trigpoint.events.mapped import MapSolved
@@ -59,10 +59,10 @@ class HttpService:
         self._settings, self._open_source, self._log = settings, open_source, log
         self._instruments = instruments or Instruments("http")
         self._socket = _listening(settings)
-        self._subscription: Subscription | None = None
+        self._news: News | None = None
         if bus is not None:
             pattern = KEY_PATTERNS[MapSolved].format(map="*")
-            self._subscription = bus.subscribe(f"{root}/{KEY_VERSION}/{pattern}")
+            self._news = bus.news(f"{root}/{KEY_VERSION}/{pattern}")
         self._watch: MapWatch | None = None
 
     @property
@@ -84,8 +84,8 @@ class HttpService:
     def close(self) -> None:
         """Nothing is listened to any more; again: no effect."""
         self._socket.close()
-        if self._subscription is not None:
-            self._subscription.close()
+        if self._news is not None:
+            self._news.close()
 
     async def _serve(self, stop: threading.Event) -> None:
         source = self._open_source()
@@ -115,9 +115,9 @@ class HttpService:
 
     def _heard(self, stop: threading.Event, watch: MapWatch, loop: asyncio.AbstractEventLoop) -> bool:
         """Whether to stop, after a while."""
-        if self._subscription is None:
+        if self._news is None:
             return stop.wait(LISTEN_S)
-        if self._subscription.receive(LISTEN_S) is not None:
+        if self._news.wait(LISTEN_S):
             loop.call_soon_threadsafe(watch.tell)
         return stop.is_set()
 

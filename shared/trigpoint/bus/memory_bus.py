@@ -6,6 +6,7 @@ from types import TracebackType
 from typing import Self
 
 from trigpoint.bus.arrivals import messages_of_run, run_of_messages
+from trigpoint.bus.bell import Bell
 from trigpoint.bus.inbox import INBOX_CAPACITY, Inbox
 from trigpoint.bus.key_expressions import checked_expression, checked_key, key_matches
 from trigpoint.bus.memory_queries import MemoryQueryable, MemoryQueryables
@@ -59,6 +60,34 @@ class MemorySubscription:
         self._inbox.close()
 
 
+class MemoryNews:
+    """Word of messages of one expression; made by MemoryBus.news."""
+
+    def __init__(self, expression: str, exchange: "MemoryExchange") -> None:
+        self._expression, self._exchange = expression, exchange
+        self._bell = Bell()
+
+    def matches(self, key: str) -> bool:
+        """Whether messages on this key are news here."""
+        return key_matches(self._expression, key)
+
+    def offer(self, message: BusMessage) -> None:
+        """Word of the message, which is not kept."""
+        self._bell.ring()
+
+    def wait(self, timeout_s: float) -> bool:
+        """Whether something came since the last time, or comes within `timeout_s`."""
+        return self._bell.wait(timeout_s)
+
+    def close(self) -> None:
+        """No more news."""
+        self._exchange.leave(self)
+        self._bell.silence()
+
+
+Listener = MemorySubscription | MemoryNews
+
+
 class MemoryClaim:
     """A claimed key; made by MemoryBus.claim."""
 
@@ -77,7 +106,7 @@ class MemoryExchange:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._joined = threading.Condition(self._lock)
-        self._subscriptions: tuple[MemorySubscription, ...] = ()
+        self._subscriptions: tuple[Listener, ...] = ()
         self._claims: tuple[MemoryClaim, ...] = ()
         self.queryables = MemoryQueryables()
 
@@ -95,18 +124,18 @@ class MemoryExchange:
         """The claimed keys an expression matches, sorted."""
         return tuple(sorted({claim.key for claim in self._claims if key_matches(expression, claim.key)}))
 
-    def join(self, subscription: MemorySubscription) -> None:
+    def join(self, subscription: Listener) -> None:
         """From now on the subscription hears what matches it."""
         with self._lock:
             self._subscriptions = (*self._subscriptions, subscription)
             self._joined.notify_all()
 
-    def leave(self, subscription: MemorySubscription) -> None:
+    def leave(self, subscription: Listener) -> None:
         """The subscription hears no more; again: no effect."""
         with self._lock:
             self._subscriptions = tuple(other for other in self._subscriptions if other is not subscription)
 
-    def listeners(self, key: str) -> list[MemorySubscription]:
+    def listeners(self, key: str) -> list[Listener]:
         """The subscriptions that match a key, in order of joining."""
         return [subscription for subscription in self._subscriptions if subscription.matches(key)]
 
@@ -122,7 +151,7 @@ class MemoryBus:
     def __init__(self, exchange: MemoryExchange | None = None, *, capacity: int = INBOX_CAPACITY) -> None:
         self._exchange = exchange if exchange is not None else MemoryExchange()
         self._capacity = capacity
-        self._own: list[MemorySubscription] = []
+        self._own: list[Listener] = []
         self._queryables: list[MemoryQueryable] = []
         self._claims: list[MemoryClaim] = []
         self._closed = False
@@ -162,6 +191,14 @@ class MemoryBus:
         self._own.append(subscription)
         self._exchange.join(subscription)
         return subscription
+
+    def news(self, key_expression: str) -> MemoryNews:
+        """Word of every message on the keys the expression matches."""
+        self._require_open()
+        news = MemoryNews(checked_expression(key_expression), self._exchange)
+        self._own.append(news)
+        self._exchange.join(news)
+        return news
 
     def queryable(self, key_expression: str) -> MemoryQueryable:
         """Queries on all keys the expression matches."""

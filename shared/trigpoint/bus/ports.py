@@ -140,6 +140,18 @@ class Subscription(Protocol):
         """No more messages; ones not yet received are dropped."""
 
 
+class News(Protocol):
+    """That something was published under a key expression, and nothing of what: however much it was, it takes no room.
+    For those who read the log and only want to be woken."""
+
+    def wait(self, timeout_s: float) -> bool:
+        """Whether something came since the last time this was true, or comes within `timeout_s`; once closed, False at
+        once."""
+
+    def close(self) -> None:
+        """No more news, a `wait` under way is ended; again: no effect."""
+
+
 class Bus(Protocol):
     """Publishes and subscribes; a context manager, so that it is always closed."""
 
@@ -163,6 +175,9 @@ class Bus(Protocol):
 
         Raises InputError for an expression that is not well formed, ServiceError on a closed bus.
         """
+
+    def news(self, key_expression: str) -> News:
+        """Word of every message on the keys the expression matches. Raises as `subscribe` does."""
 
     def queryable(self, key_expression: str) -> Queryable:
         """Queries on all keys the expression matches, to be answered. Raises as `subscribe` does."""

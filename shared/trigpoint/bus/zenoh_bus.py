@@ -13,10 +13,12 @@ import zenoh
 
 from trigpoint.bus.arrivals import Arrival, messages_of, messages_of_run, runs_of_key, runs_of_messages
 from trigpoint.bus.attachment import encode_attachment, encode_bundle, run_attachments
+from trigpoint.bus.bell import Bell
 from trigpoint.bus.inbox import INBOX_BYTES, INBOX_CAPACITY, Inbox
 from trigpoint.bus.key_expressions import checked_expression, checked_key
 from trigpoint.bus.ports import PROTOBUF, BusMessage, BusRun, Content, Replies
 from trigpoint.bus.tls import TlsFiles, checked_endpoints, tls_values
+from trigpoint.bus.zenoh_callback import JoinedCallback
 from trigpoint.bus.zenoh_queries import ZenohQueryable, encoding_of, replies_to
 from trigpoint.errors import InputError, ServiceError
 
@@ -83,7 +85,8 @@ class ZenohSubscription:
         self._runs: deque[BusRun] = deque()
         self._by_key: dict[tuple[str, str], list[Arrival]] = {}
         self._gathered = 0  # messages in them
-        self._subscriber = session.declare_subscriber(key_expression, self._arrived)
+        self._callback: JoinedCallback[zenoh.Sample] = JoinedCallback(self._arrived)
+        self._subscriber = session.declare_subscriber(key_expression, self._callback.handler)
 
     def _arrived(self, sample: zenoh.Sample) -> None:
         attached = sample.attachment
@@ -156,6 +159,27 @@ class ZenohSubscription:
         self._forget_runs()
         with contextlib.suppress(zenoh.ZError):  # already undeclared, or its session is gone
             self._subscriber.undeclare()  # type: ignore[no-untyped-call]
+        self._callback.join()
+
+
+class ZenohNews:
+    """Word of messages of one expression; made by ZenohBus.news."""
+
+    def __init__(self, session: zenoh.Session, key_expression: str) -> None:
+        self._bell = Bell()
+        self._callback: JoinedCallback[zenoh.Sample] = JoinedCallback(lambda _: self._bell.ring())
+        self._subscriber = session.declare_subscriber(key_expression, self._callback.handler)
+
+    def wait(self, timeout_s: float) -> bool:
+        """Whether something came since the last time, or comes within `timeout_s`."""
+        return self._bell.wait(timeout_s)
+
+    def close(self) -> None:
+        """No more news."""
+        self._bell.silence()
+        with contextlib.suppress(zenoh.ZError):  # already undeclared, or its session is gone
+            self._subscriber.undeclare()  # type: ignore[no-untyped-call]
+        self._callback.join()
 
 
 class ZenohClaim:
@@ -177,7 +201,7 @@ class ZenohBus:
         self._settings = settings
         self._lock = threading.Lock()
         self._publishers: dict[tuple[str, str], zenoh.Publisher] = {}
-        self._subscriptions: list[ZenohSubscription] = []
+        self._subscriptions: list[ZenohSubscription | ZenohNews] = []
         self._claims: list[ZenohClaim] = []
         self._queryables: list[ZenohQueryable] = []
         try:
@@ -240,6 +264,13 @@ class ZenohBus:
         self._subscriptions.append(subscription)
         return subscription
 
+    def news(self, key_expression: str) -> ZenohNews:
+        """Word of every message on the keys the expression matches."""
+        self._require_open()
+        news = ZenohNews(self._session, checked_expression(key_expression))
+        self._subscriptions.append(news)
+        return news
+
     def queryable(self, key_expression: str) -> ZenohQueryable:
         """Queries on all keys the expression matches."""
         self._require_open()
@@ -260,12 +291,14 @@ class ZenohBus:
         self._require_open()
         there = threading.Event()
         querier = self._session.declare_querier(checked_key(key), target=zenoh.QueryTarget.ALL)
-        changes = querier.declare_matching_listener(lambda status: there.set() if status.matching else None)
+        callback = _matching(there)
+        changes = querier.declare_matching_listener(callback.handler)
         try:
             # Typed bool in zenoh 1.10's stubs, in truth a MatchingStatus, which is always true as a condition.
             return cast(zenoh.MatchingStatus, querier.matching_status).matching or there.wait(timeout_s)
         finally:
             changes.undeclare()  # type: ignore[no-untyped-call]
+            callback.join()
             querier.undeclare()  # type: ignore[no-untyped-call]
 
     def claim(self, key: str) -> ZenohClaim:
@@ -293,13 +326,13 @@ class ZenohBus:
     def await_listener(self, key: str, timeout_s: float) -> bool:
         """Whether Zenoh knows of a subscription that matches the key, at once or within `timeout_s`."""
         heard = threading.Event()
-        changes = self._publisher(key, "").declare_matching_listener(
-            lambda status: heard.set() if status.matching else None
-        )
+        callback = _matching(heard)
+        changes = self._publisher(key, "").declare_matching_listener(callback.handler)
         try:
             return self.has_listener(key) or heard.wait(timeout_s)
         finally:
             changes.undeclare()  # type: ignore[no-untyped-call]
+            callback.join()
 
     def close(self) -> None:
         """The session, its publishers and subscriptions ended: an open one would hang the interpreter's exit."""
@@ -327,6 +360,10 @@ class ZenohBus:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _matching(there: threading.Event) -> JoinedCallback[zenoh.MatchingStatus]:
+    return JoinedCallback(lambda status: there.set() if status.matching else None)
 
 
 def _bundles(payloads: Sequence[bytes]) -> Iterator[tuple[int, int]]:

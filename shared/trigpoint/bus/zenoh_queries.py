@@ -11,6 +11,7 @@ import zenoh
 from trigpoint.bus.inbox import INBOX_BYTES, Inbox
 from trigpoint.bus.key_expressions import is_wild
 from trigpoint.bus.ports import Content, Replies, Reply
+from trigpoint.bus.zenoh_callback import JoinedCallback
 from trigpoint.errors import ServiceError
 
 QUERIES_WAITING = 4096  # at one queryable: an asker gives up long before the last of more is answered
@@ -95,7 +96,8 @@ class ZenohQueryable:
     def __init__(self, session: zenoh.Session, key_expression: str) -> None:
         self._expression = key_expression
         self._inbox: Inbox[zenoh.Query] = Inbox(QUERIES_WAITING, capacity_bytes=INBOX_BYTES)
-        self._queryable = session.declare_queryable(key_expression, self._inbox.offer)
+        self._callback: JoinedCallback[zenoh.Query] = JoinedCallback(self._inbox.offer)
+        self._queryable = session.declare_queryable(key_expression, self._callback.handler)
 
     @property
     def lost(self) -> int:
@@ -118,6 +120,7 @@ class ZenohQueryable:
             query.drop()  # type: ignore[no-untyped-call]
         with contextlib.suppress(zenoh.ZError):  # already undeclared, or its session is gone
             self._queryable.undeclare()  # type: ignore[no-untyped-call]
+        self._callback.join()
 
 
 def replies_to(session: zenoh.Session, key_expression: str, content: Content, *, timeout_s: float) -> Replies:

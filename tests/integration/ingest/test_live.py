@@ -13,7 +13,7 @@ from typing import Self
 import pytest
 
 from trigpoint.bus.memory_bus import MemoryBus, MemoryExchange
-from trigpoint.bus.ports import Bus, BusMessage, BusRun, Claim, Content, Queryable, Replies, Subscription
+from trigpoint.bus.ports import Bus, BusMessage, BusRun, Claim, Content, News, Queryable, Replies, Subscription
 from trigpoint.bus.zenoh_bus import ZenohBus, ZenohSettings
 from trigpoint.errors import AppendFailed, LogDamaged, ServiceError
 from trigpoint.events.codec import schema_name
@@ -72,6 +72,9 @@ class LossyBus:
 
     def subscribe(self, key_expression: str) -> Subscription:
         return self._bus.subscribe(key_expression)
+
+    def news(self, key_expression: str) -> News:
+        return self._bus.news(key_expression)
 
     def claim(self, key: str) -> Claim:
         return self._bus.claim(key)

@@ -9,8 +9,8 @@ import pytest
 
 from driven_paths.examples import FRAME, START_NS, Course, driven
 from trigpoint.bus.event_messages import event_message
-from trigpoint.bus.memory_bus import MemoryBus, MemoryExchange, MemorySubscription
-from trigpoint.bus.ports import BusMessage, BusRun
+from trigpoint.bus.memory_bus import MemoryBus, MemoryExchange, MemoryNews
+from trigpoint.bus.ports import BusMessage
 from trigpoint.events.codec import Event, decode, encode
 from trigpoint.events.drives import Drive
 from trigpoint.events.envelope import Envelope, EventIdentity
@@ -170,19 +170,19 @@ class SteadyBus(MemoryBus):
         super().__init__()
         self._row, self._stop, self._heard = row, stop, 0
 
-    def subscribe(self, key_expression: str) -> MemorySubscription:
-        subscription = super().subscribe(key_expression)
-        receive_run = subscription.receive_run
+    def news(self, key_expression: str) -> MemoryNews:
+        news = super().news(key_expression)
+        wait = news.wait
 
-        def next_run(timeout_s: float) -> BusRun | None:
+        def more(timeout_s: float) -> bool:
             self.publish(message_of(self._row))
             self._heard += 1
             if self._heard > 5:
                 self._stop.set()
-            return receive_run(timeout_s)
+            return wait(timeout_s)
 
-        subscription.receive_run = next_run  # type: ignore[method-assign]
-        return subscription
+        news.wait = more  # type: ignore[method-assign]
+        return news
 
 
 def test_estimates_are_in_the_log_while_messages_never_cease() -> None:

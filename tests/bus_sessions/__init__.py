@@ -1,0 +1,1 @@
+"""Sessions of each bus that hear one another, and what tests send between them."""
