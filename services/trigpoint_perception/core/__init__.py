@@ -1,0 +1,1 @@
+"""Perception as functions of sweeps: no log, no clock, no chance."""

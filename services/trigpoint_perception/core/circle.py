@@ -1,0 +1,107 @@
+"""A circle fitted to an arc that was seen from one side, with an honest covariance."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trigpoint_perception.core.compiled import compiled
+
+Floats = NDArray[np.float64]
+
+ITERATIONS = 8
+RADIUS_MIN_M = 0.02
+MEAN_DEPTH = 0.785  # of a cylinder's visible points before its axis, radii
+DIVERGENCE_RAD = 0.003  # full width of a usual sensor's beam
+SYSTEMATIC_SIGMA_M = 0.015  # of the sensor's calibration and the object's shape; no number of points lowers it
+SHARED_POINTS = 9.0  # neighbours' errors go together (a surface's reflectivity and tilt): these count as one
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arc:
+    """Points (n, 2) of an upright cylinder seen from `viewpoint_m` (2,), and the widths (k,) its k segments span as
+    seen from there, neighbouring beams `step_rad` apart."""
+
+    point_m: Floats
+    viewpoint_m: Floats
+    width_m: Floats
+    step_rad: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Circle:
+    """A circle with the covariance (2, 2) of its centre in m^2; `residual_m` the points' root mean square distance."""
+
+    centre_m: Floats
+    radius_m: float
+    covariance_m2: Floats
+    radius_sigma_m: float
+    residual_m: float
+
+
+def fitted_circle(arc: Arc, *, range_sigma_m: float, radius_max_m: float) -> Circle:
+    """The circle nearest to the points, its radius held by the widths the object covered.
+
+    Gauss-Newton on geometric distances (Huber's weights) with the angular width as a measurement of the radius: from
+    one side alone the points hardly tell a large circle from a near one, and the covariance says so. Its scale is the
+    larger of the sensor's noise and the residuals found; neighbours' errors are taken as shared.
+    """
+    sight_m = arc.point_m.mean(axis=0) - arc.viewpoint_m
+    away_m = float(np.hypot(sight_m[0], sight_m[1]))
+    width_m, width_sigma_m = _width(arc, arc.step_rad * away_m, away_m)
+    prior_m = min(max(0.5 * width_m, RADIUS_MIN_M), radius_max_m)
+    begin_m = arc.viewpoint_m + sight_m * (1.0 + MEAN_DEPTH * prior_m / away_m)
+    state, information, residual_m = _iterated(
+        arc.point_m, begin_m, prior_m, 0.5 * width_sigma_m, range_sigma_m, radius_max_m
+    )
+    inflation = max(1.0, (residual_m / range_sigma_m) ** 2) * min(SHARED_POINTS, len(arc.point_m))
+    covariance = np.linalg.inv(information) * inflation
+    return Circle(
+        centre_m=state[:2],
+        radius_m=float(state[2]),
+        covariance_m2=covariance[:2, :2] + SYSTEMATIC_SIGMA_M**2 * np.eye(2),
+        radius_sigma_m=float(np.sqrt(min(covariance[2, 2], (0.5 * width_sigma_m) ** 2) + SYSTEMATIC_SIGMA_M**2)),
+        residual_m=residual_m,
+    )
+
+
+def _width(arc: Arc, beam_m: float, away_m: float) -> tuple[float, float]:
+    """The width in m and its 1-sigma: beams fall at random on the two edges, and touch an object half a beam early."""
+    ordered = np.sort(arc.width_m)
+    count = len(ordered)
+    spread_m = 0.74 * float(ordered[(3 * count) // 4] - ordered[count // 4]) if count > 1 else 0.0
+    sigma_m = math.hypot(max(beam_m / math.sqrt(6.0), spread_m) / math.sqrt(count), SYSTEMATIC_SIGMA_M)
+    return float(ordered[count // 2]) + beam_m - 0.5 * DIVERGENCE_RAD * away_m, sigma_m
+
+
+@compiled
+def _iterated(
+    point_m: Floats, begin_m: Floats, prior_m: float, prior_sigma_m: float, sigma_m: float, radius_max_m: float
+) -> tuple[Floats, Floats, float]:
+    """Centre and radius (3,), their information (3, 3), and the points' root mean square distance."""
+    state = np.array([begin_m[0], begin_m[1], prior_m])
+    information = np.eye(3)
+    for _ in range(ITERATIONS):
+        information = np.zeros((3, 3))
+        gradient = np.zeros(3)
+        for row in range(len(point_m)):
+            x, y = point_m[row, 0] - state[0], point_m[row, 1] - state[1]
+            distance = max(np.hypot(x, y), 1e-9)
+            residual = distance - state[2]
+            weight = 1.0 / (sigma_m**2 * max(1.0, abs(residual) / (2.0 * sigma_m)))
+            derivative = np.array([-x / distance, -y / distance, -1.0])
+            for one in range(3):
+                gradient[one] += weight * derivative[one] * residual
+                for other in range(3):
+                    information[one, other] += weight * derivative[one] * derivative[other]
+        information[2, 2] += 1.0 / prior_sigma_m**2
+        gradient[2] += (state[2] - prior_m) / prior_sigma_m**2
+        information[0, 0] += 1e-6 / prior_sigma_m**2  # solvable where all points lie in one direction
+        information[1, 1] += 1e-6 / prior_sigma_m**2
+        state = state - np.linalg.solve(information, gradient)
+        state[2] = min(max(state[2], RADIUS_MIN_M), radius_max_m)
+    squares = 0.0
+    for row in range(len(point_m)):
+        squares += (np.hypot(point_m[row, 0] - state[0], point_m[row, 1] - state[1]) - state[2]) ** 2
+    return state, information, np.sqrt(squares / len(point_m))

@@ -1,0 +1,231 @@
+"""Pole-like objects of one sweep: segments of several rings that stand one above the other, thin and in the open."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from trigpoint_perception.core.circle import Arc, Circle, fitted_circle
+from trigpoint_perception.core.compiled import compiled
+from trigpoint_perception.core.segments import OrderedSweep, Segments
+from trigpoint_perception.settings import PoleSettings
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+PoleClass = Literal["pole", "trunk", "sign"]
+
+AXIS_HEIGHT_M = 3.0  # the axis is fitted to what stands lower, where there is enough: crowns and arms begin above
+OUTLIER_M = 0.2  # of a ring's centre from the axis: another object
+CROWN_REACH_M = 1.5
+CROWN_FROM_M = 0.3  # above the top of what was taken for the trunk, or as near beside it
+CROWN_SHARE = 1.5  # points of the crown for each of the trunk
+TRUNK_RADIUS_M = 0.17  # thicker than any lamp post
+PANEL_WIDTH_M = (0.25, 1.3)
+PANEL_HEIGHT_M = (1.2, 4.5)
+PANEL_RATIO = 2.0  # times the pole's own width
+PANEL_RINGS = 2
+PERSON_RADIUS_M = 0.08
+PERSON_TOP_M = 2.1
+PERSON_CLEAR_M = 0.3  # seen to be free above
+FLANK_SHARE = 0.5  # points beside it for each of its own
+FLANK_REACH_M = 0.7
+FLANK_FREE_M = 0.15  # from its surface: its own base, its own blurred edge
+FLANK_DEPTH_M = 0.35
+FLANK_HEIGHT_M = (0.35, 1.8)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PerceivedPole:
+    """A pole-like object in the base frame: its axis near the ground (2,) with covariance (2, 2) in m^2, radius,
+    bottom and top above the ground as far as they were seen, points and rings that hit it, and what it looks like."""
+
+    centre_m: Floats
+    covariance_m2: Floats
+    radius_m: float
+    radius_sigma_m: float
+    bottom_m: float
+    top_m: float
+    points: int
+    rings: int
+    landmark_class: PoleClass
+
+
+def perceived_poles(
+    ordered: OrderedSweep, segments: Segments, sensor_m: Floats, settings: PoleSettings, *, clearance_m: float
+) -> tuple[PerceivedPole, ...]:
+    """The pole-like objects of a sweep, in no particular order."""
+    thin = _thin_segments(segments, settings, clearance_m)
+    if len(thin) < settings.rings_min:
+        return ()
+    centre_m = _segment_centres(segments, thin, sensor_m)
+    scene = _Scene(ordered, segments, sensor_m, settings, _slope_top(ordered, sensor_m))
+    poles = [scene.pole_of(thin[rows], centre_m[rows]) for rows in _stacks(centre_m, settings)]
+    return tuple(pole for pole in poles if pole is not None)
+
+
+def _thin_segments(segments: Segments, settings: PoleSettings, clearance_m: float) -> Ints:
+    """Segments that may be part of a pole: narrow, nearer than what is beside them, above the ground."""
+    return np.nonzero(
+        segments.open_left
+        & segments.open_right
+        & (segments.width_m <= settings.width_max_m)
+        & (segments.mean_height_m >= clearance_m)
+        & (segments.near_m <= settings.range_max_m)
+    )[0]
+
+
+def _segment_centres(segments: Segments, thin: Ints, sensor_m: Floats) -> Floats:
+    """Where the axis is (m, 2) if each segment is a cylinder's front."""
+    out_m = segments.near_m[thin] + np.minimum(0.5 * segments.width_m[thin], 0.4)
+    angle = segments.azimuth_rad[thin]
+    return sensor_m[:2] + np.column_stack([out_m * np.cos(angle), out_m * np.sin(angle)])
+
+
+def _stacks(centre_m: Floats, settings: PoleSettings) -> list[Ints]:
+    """Rows of segments that are linked by nearness, in groups of enough rings."""
+    pairs = cKDTree(centre_m).query_pairs(settings.link_m, output_type="ndarray")
+    size = len(centre_m)
+    graph = coo_matrix((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
+    _, label = connected_components(graph, directed=False)
+    order = np.argsort(label, kind="stable")
+    groups = np.split(order, np.nonzero(np.diff(label[order]))[0] + 1)
+    return [rows for rows in groups if len(rows) >= settings.rings_min]
+
+
+def _slope_top(ordered: OrderedSweep, sensor_m: Floats) -> float:
+    begin = int(ordered.ring_begin[-2])
+    return float(np.median((ordered.point_m[begin:, 2] - sensor_m[2]) / np.maximum(ordered.run_m[begin:], 0.1)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Scene:
+    ordered: OrderedSweep
+    segments: Segments
+    sensor_m: Floats
+    settings: PoleSettings
+    slope_top: float  # rise per run of the highest laser
+
+    def pole_of(self, chosen: Ints, centre_m: Floats) -> PerceivedPole | None:
+        """The pole that a stack of segments is, None if it is none."""
+        upright = self._upright(chosen, centre_m)
+        if upright is None:
+            return None
+        chosen, rings = upright
+        height_m = self.segments.mean_height_m[chosen]
+        low = chosen[height_m <= AXIS_HEIGHT_M]
+        circle = self._circle(low if len(low) >= self.settings.rings_min else chosen)
+        if circle.residual_m > 2.5 * self.settings.range_sigma_m:
+            return None
+        bottom_m, top_m, points = float(height_m.min()), float(height_m.max()), int(self.segments.count[chosen].sum())
+        if self._is_person(circle, top_m) or self._is_flanked(circle, points):
+            return None
+        return PerceivedPole(
+            centre_m=circle.centre_m,
+            covariance_m2=circle.covariance_m2,
+            radius_m=circle.radius_m,
+            radius_sigma_m=circle.radius_sigma_m,
+            bottom_m=bottom_m,
+            top_m=top_m,
+            points=points,
+            rings=rings,
+            landmark_class=self._class_of(circle, top_m, points),
+        )
+
+    def _upright(self, chosen: Ints, centre_m: Floats) -> tuple[Ints, int] | None:
+        """What of a stack stands on one upright axis, and the number of rings; None where that is too little."""
+        limits = self.settings
+        ring, height_m = self.segments.ring[chosen], self.segments.mean_height_m[chosen]
+        near, rings, span, slope, scatter_m = _axis(centre_m, ring, height_m, OUTLIER_M)
+        if rings < limits.rings_min or self.segments.count[chosen[near]].sum() < limits.points_min:
+            return None
+        bottom_m, top_m = height_m[near].min(), height_m[near].max()
+        standing = bottom_m <= limits.bottom_max_m and top_m >= limits.top_min_m
+        tall = top_m - bottom_m >= limits.extent_min_m
+        straight = scatter_m <= limits.scatter_max_m and slope <= limits.tilt_max
+        filled = rings >= limits.filled_share_min * span
+        return (chosen[near], rings) if standing and tall and straight and filled else None
+
+    def _circle(self, chosen: Ints) -> Circle:
+        rows = np.concatenate([self._rows(segment) for segment in chosen])
+        arc = Arc(
+            point_m=self.ordered.point_m[rows, :2],
+            viewpoint_m=self.sensor_m[:2],
+            width_m=self.segments.width_m[chosen],
+            step_rad=self.ordered.step_rad,
+        )
+        return fitted_circle(
+            arc, range_sigma_m=self.settings.range_sigma_m, radius_max_m=self.settings.radius_max_m
+        )
+
+    def _rows(self, segment: int) -> Ints:
+        """The ordered sweep's rows of a segment."""
+        ring = self.segments.ring[segment]
+        begin, end = self.ordered.ring_begin[ring], self.ordered.ring_begin[ring + 1]
+        steps = np.arange(self.segments.count[segment])
+        rows: Ints = begin + (self.segments.first[segment] - begin + steps) % (end - begin)
+        return rows
+
+    def _is_person(self, circle: Circle, top_m: float) -> bool:
+        """Whether what is as thick as a person ends at a person's height, and not where the sensor's view does."""
+        away_m = float(np.hypot(*(circle.centre_m - self.sensor_m[:2])))
+        seen_to_m = float(self.sensor_m[2]) + away_m * self.slope_top
+        return circle.radius_m > PERSON_RADIUS_M and top_m < PERSON_TOP_M and seen_to_m > top_m + PERSON_CLEAR_M
+
+    def _is_flanked(self, circle: Circle, points: int) -> bool:
+        """Whether something stands beside it at the same distance: a hedge, a car, a wall with windows."""
+        sight = circle.centre_m - self.sensor_m[:2]
+        beside = _beside(
+            self.ordered.point_m, self.ordered.height_m, circle.centre_m, sight / np.hypot(*sight), circle.radius_m
+        )
+        return beside > FLANK_SHARE * points
+
+    def _class_of(self, circle: Circle, top_m: float, points: int) -> PoleClass:
+        away_m = np.linalg.norm(self.segments.mean_m[:, :2] - circle.centre_m, axis=1)
+        height_m, width_m = self.segments.mean_height_m, self.segments.width_m
+        panel = (
+            (away_m < 0.4)
+            & (width_m >= max(PANEL_WIDTH_M[0], 2.0 * PANEL_RATIO * circle.radius_m))
+            & (width_m <= PANEL_WIDTH_M[1])
+            & (height_m >= PANEL_HEIGHT_M[0])
+            & (height_m <= PANEL_HEIGHT_M[1])
+        )
+        crown = (away_m < CROWN_REACH_M) & (height_m > max(top_m - CROWN_FROM_M, 1.8)) & (away_m > circle.radius_m + 0.25)
+        if self.segments.count[crown].sum() >= CROWN_SHARE * points or circle.radius_m > TRUNK_RADIUS_M:
+            return "trunk"
+        return "sign" if np.count_nonzero(panel) >= PANEL_RINGS else "pole"
+
+
+@compiled
+def _axis(centre_m: Floats, ring: Ints, height_m: Floats, outlier_m: float) -> tuple[Bools, int, int, float, float]:
+    """Which centres (m,) are near the middle one, their rings and the rings they span, the run per rise of the straight
+    axis through them, and their root mean square distance from it."""
+    middle_x, middle_y = np.median(centre_m[:, 0]), np.median(centre_m[:, 1])
+    near = np.hypot(centre_m[:, 0] - middle_x, centre_m[:, 1] - middle_y) <= outlier_m
+    if not near.any():
+        return near, 0, 1, 0.0, 0.0
+    x, y, z, rings = centre_m[near, 0], centre_m[near, 1], height_m[near], np.unique(ring[near])
+    x, y, z = x - x.mean(), y - y.mean(), z - z.mean()
+    rise = max((z * z).sum(), 1e-9)
+    slope_x, slope_y = (x * z).sum() / rise, (y * z).sum() / rise
+    scatter = np.sqrt(((x - slope_x * z) ** 2 + (y - slope_y * z) ** 2).mean())
+    return near, len(rings), rings[-1] - rings[0] + 1, np.hypot(slope_x, slope_y), scatter
+
+
+@compiled
+def _beside(point_m: Floats, height_m: Floats, centre_m: Floats, sight: Floats, radius_m: float) -> int:
+    """The number of points to both sides of a pole, seen along the unit vector `sight`, as far away as it is."""
+    count = 0
+    for row in range(len(point_m)):
+        x, y = point_m[row, 0] - centre_m[0], point_m[row, 1] - centre_m[1]
+        if abs(x) > FLANK_REACH_M or abs(y) > FLANK_REACH_M:
+            continue
+        across = abs(x * sight[1] - y * sight[0])
+        if FLANK_HEIGHT_M[0] <= height_m[row] <= FLANK_HEIGHT_M[1] and across > radius_m + FLANK_FREE_M:
+            count += abs(x * sight[0] + y * sight[1]) < FLANK_DEPTH_M
+    return count

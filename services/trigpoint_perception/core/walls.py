@@ -1,0 +1,234 @@
+"""Walls of one sweep as straight lines in plan: split ring by ring, merged over the rings."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trigpoint_perception.core.compiled import compiled
+from trigpoint_perception.core.segments import OrderedSweep
+from trigpoint_perception.settings import WallSettings
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+MERGE_ANGLE_RAD = 0.09  # 5 degrees
+MERGE_OFFSET_M = 0.15
+MERGE_GAP_M = 0.6
+PIECE_SHARE = 0.4  # of a wall's least length, for one ring's piece of it
+RANGE_SIGMA_M = 0.03
+SHARED_POINTS = 6.0  # neighbours' errors go together: so many points tell as much as one
+FROM_M = 0.3  # above the ground
+SUMS = 9  # n, x, y, xx, xy, yy, top, lowest ring, highest ring
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Walls:
+    """Walls (m,): middle_m (m, 2) and unit direction (m, 2) in the base frame, begin and end along it (m,) from the
+    middle; 1-sigma of the offset across (m,) in m and of the direction (m,) in rad; top above the ground, rings."""
+
+    middle_m: Floats
+    direction: Floats
+    begin_m: Floats
+    end_m: Floats
+    offset_sigma_m: Floats
+    direction_sigma_rad: Floats
+    top_m: Floats
+    rings: Ints
+
+
+def walls_of(ordered: OrderedSweep, sensor_m: Floats, settings: WallSettings) -> Walls:
+    """The walls of a sweep: straight, upright, higher than cars.
+
+    Points of cells in plan that hold points from low to high are taken ring by ring, chained, split where they leave
+    the chord (Douglas and Peucker 1973, as iterative end-point fit), fitted by least squares, and pieces on one line
+    are merged, the longest first.
+    """
+    upright = _upright(ordered, sensor_m, settings)
+    sums, extent = _pieces(
+        ordered.point_m, ordered.height_m, ordered.ring, ordered.run_m, upright, ordered.step_rad,
+        np.array([settings.gap_m, settings.split_m, settings.sigma_max_m, PIECE_SHARE * settings.length_min_m]),
+        settings.points_min,
+    )  # fmt: skip
+    longest_first = np.argsort(-(extent[:, 1] - extent[:, 0]), kind="stable")
+    merged = _merged(sums[longest_first], extent[longest_first])
+    return _kept(*merged, settings)
+
+
+def _upright(ordered: OrderedSweep, sensor_m: Floats, settings: WallSettings) -> Bools:
+    """Which points (n,) stand in a cell that is filled from low to high."""
+    side = int(2.0 * settings.range_max_m / settings.cell_m) + 1
+    cell = np.floor((ordered.point_m[:, :2] - sensor_m[:2] + settings.range_max_m) / settings.cell_m).astype(np.int64)
+    inside = (ordered.height_m > FROM_M) & (cell >= 0).all(axis=1) & (cell < side).all(axis=1)
+    number = np.where(inside, cell[:, 0] * side + cell[:, 1], -1)
+    return _filled(number, ordered.height_m, side * side, settings.top_min_m, settings.extent_min_m)
+
+
+def _kept(sums: Floats, extent: Floats, settings: WallSettings) -> Walls:
+    middle_m, direction, sigma_m = _fitted(sums)
+    length_m = extent[:, 1] - extent[:, 0]
+    rings = (sums[:, 8] - sums[:, 7] + 1.0).astype(np.int64)
+    kept = (length_m >= settings.length_min_m) & (sigma_m <= settings.sigma_max_m) & (sums[:, 6] >= settings.top_min_m)
+    kept &= rings > 1
+    independent = np.maximum(sums[:, 0] / SHARED_POINTS, 1.0)
+    sigma_m = np.maximum(sigma_m, RANGE_SIGMA_M) / np.sqrt(independent)
+    return Walls(
+        middle_m=middle_m[kept],
+        direction=direction[kept],
+        begin_m=extent[kept, 0],
+        end_m=extent[kept, 1],
+        offset_sigma_m=sigma_m[kept],
+        direction_sigma_rad=(sigma_m * np.sqrt(12.0) / np.maximum(length_m, 1e-9))[kept],
+        top_m=sums[kept, 6],
+        rings=rings[kept],
+    )
+
+
+def _fitted(sums: Floats) -> tuple[Floats, Floats, Floats]:
+    """Middles (m, 2), directions (m, 2) and root mean square distances (m,) from the lines of sums (m, 9)."""
+    line = np.array([_line(row) for row in sums]).reshape(-1, 5)
+    return line[:, 0:2], line[:, 2:4], line[:, 4]
+
+
+@compiled
+def _filled(cell: Ints, height_m: Floats, cells: int, top_min_m: float, extent_min_m: float) -> Bools:
+    low, high = np.full(cells, np.inf), np.full(cells, -np.inf)
+    for row in range(len(cell)):
+        if cell[row] >= 0:
+            low[cell[row]] = min(low[cell[row]], height_m[row])
+            high[cell[row]] = max(high[cell[row]], height_m[row])
+    filled = np.zeros(len(cell), np.bool_)
+    for row in range(len(cell)):
+        if cell[row] >= 0:
+            filled[row] = high[cell[row]] >= top_min_m and high[cell[row]] - low[cell[row]] >= extent_min_m
+    return filled
+
+
+@compiled
+def _line(sums: Floats) -> tuple[float, float, float, float, float]:
+    """Middle x, y, direction x, y, and root mean square distance of the line of total least squares."""
+    count = sums[0]
+    x, y = sums[1] / count, sums[2] / count
+    xx, xy, yy = sums[3] / count - x * x, sums[4] / count - x * y, sums[5] / count - y * y
+    angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
+    smallest = 0.5 * (xx + yy) - np.hypot(0.5 * (xx - yy), xy)
+    return x, y, np.cos(angle), np.sin(angle), np.sqrt(max(smallest, 0.0))
+
+
+@compiled
+def _pieces(
+    point_m: Floats,
+    height_m: Floats,
+    ring: Ints,
+    run_m: Floats,
+    upright: Bools,
+    step_rad: float,
+    limits: Floats,
+    points_min: int,
+) -> tuple[Floats, Floats]:
+    """Sums (m, 9) and extents (m, 2) along their own lines of the straight pieces of all rings."""
+    rows = np.nonzero(upright)[0]
+    sums, extents = np.empty((len(rows), 9)), np.empty((len(rows), 2))
+    found, begin = 0, 0
+    while begin < len(rows):
+        end = begin + 1
+        while end < len(rows):
+            here, before = rows[end], rows[end - 1]
+            apart = np.hypot(point_m[here, 0] - point_m[before, 0], point_m[here, 1] - point_m[before, 1])
+            if ring[here] != ring[before] or apart > limits[0] + 3.0 * step_rad * run_m[before]:
+                break
+            end += 1
+        stack = [(begin, end)]
+        while len(stack) > 0:
+            low, high = stack.pop()
+            if high - low < points_min:
+                continue
+            at, away = _farthest(point_m, rows, low, high)
+            if away > limits[1]:
+                stack.append((low, at))
+                stack.append((at, high))
+                continue
+            total = _summed(point_m, height_m, ring, rows, low, high)
+            x, y, dx, dy, sigma = _line(total)
+            least, most = _extent(point_m, rows, low, high, x, y, dx, dy)
+            if most - least >= limits[3] and sigma <= limits[2]:
+                sums[found] = total
+                extents[found, 0], extents[found, 1] = least, most
+                found += 1
+        begin = end
+    return sums[:found], extents[:found]
+
+
+@compiled
+def _farthest(point_m: Floats, rows: Ints, low: int, high: int) -> tuple[int, float]:
+    """The point farthest from the chord between the first and the last, and how far it is."""
+    x, y = point_m[rows[low], 0], point_m[rows[low], 1]
+    dx, dy = point_m[rows[high - 1], 0] - x, point_m[rows[high - 1], 1] - y
+    length = max(np.hypot(dx, dy), 1e-9)
+    at, away = low, 0.0
+    for number in range(low + 1, high - 1):
+        across = abs((point_m[rows[number], 1] - y) * dx - (point_m[rows[number], 0] - x) * dy) / length
+        if across > away:
+            at, away = number, across
+    return at, away
+
+
+@compiled
+def _summed(point_m: Floats, height_m: Floats, ring: Ints, rows: Ints, low: int, high: int) -> Floats:
+    total = np.zeros(9)
+    for number in range(low, high):
+        x, y = point_m[rows[number], 0], point_m[rows[number], 1]
+        total[:6] += np.array([1.0, x, y, x * x, x * y, y * y])
+        total[6] = max(total[6], height_m[rows[number]])
+    total[7] = total[8] = ring[rows[low]]
+    return total
+
+
+@compiled
+def _extent(
+    point_m: Floats, rows: Ints, low: int, high: int, x: float, y: float, dx: float, dy: float
+) -> tuple[float, float]:
+    least, most = np.inf, -np.inf
+    for number in range(low, high):
+        along = (point_m[rows[number], 0] - x) * dx + (point_m[rows[number], 1] - y) * dy
+        least, most = min(least, along), max(most, along)
+    return least, most
+
+
+@compiled
+def _merged(sums: Floats, extents: Floats) -> tuple[Floats, Floats]:
+    """Pieces on one line, near each other along it, as one; extents along the merged lines."""
+    walls, reach = np.empty_like(sums), np.empty_like(extents)
+    count = 0
+    for piece in range(len(sums)):
+        x, y, dx, dy, _ = _line(sums[piece])
+        joined = False
+        for wall in range(count):
+            wx, wy, wdx, wdy, _ = _line(walls[wall])
+            if abs(dx * wdy - dy * wdx) > np.sin(MERGE_ANGLE_RAD):
+                continue
+            if abs((x - wx) * wdy - (y - wy) * wdx) > MERGE_OFFSET_M:
+                continue
+            one = (x + extents[piece, 0] * dx - wx) * wdx + (y + extents[piece, 0] * dy - wy) * wdy
+            two = (x + extents[piece, 1] * dx - wx) * wdx + (y + extents[piece, 1] * dy - wy) * wdy
+            least, most = min(one, two), max(one, two)
+            if least > reach[wall, 1] + MERGE_GAP_M or most < reach[wall, 0] - MERGE_GAP_M:
+                continue
+            least, most = min(least, reach[wall, 0]), max(most, reach[wall, 1])
+            walls[wall, :6] += sums[piece, :6]
+            walls[wall, 6] = max(walls[wall, 6], sums[piece, 6])
+            walls[wall, 7] = min(walls[wall, 7], sums[piece, 7])
+            walls[wall, 8] = max(walls[wall, 8], sums[piece, 8])
+            nx, ny, ndx, ndy, _ = _line(walls[wall])
+            moved = (wx - nx) * ndx + (wy - ny) * ndy
+            if ndx * wdx + ndy * wdy < 0.0:
+                least, most = -most, -least
+            reach[wall, 0], reach[wall, 1] = least + moved, most + moved
+            joined = True
+            break
+        if not joined:
+            walls[count] = sums[piece]
+            reach[count] = extents[piece]
+            count += 1
+    return walls[:count], reach[:count]
