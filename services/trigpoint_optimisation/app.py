@@ -2,6 +2,7 @@
 
 import logging
 import time
+from collections.abc import Iterable
 from dataclasses import replace
 from hashlib import blake2b
 
@@ -81,8 +82,11 @@ def boot_id_of(version: int, inputs: tuple[tuple[str, int], ...], settings: Solv
     return blake2b(text.encode(), digest_size=8).hexdigest()
 
 
-def envelopes(events: tuple[Mapped, ...], *, boot_id: str, stamp_ns: int) -> list[Envelope[Event]]:
-    """The events of a version, numbered."""
+def envelopes(
+    events: Iterable[Mapped], *, boot_id: str, stamp_ns: int, first_sequence: int = 0
+) -> list[Envelope[Event]]:
+    """The events of a version, or a part of them, numbered."""
     return [
-        Envelope(EventIdentity(SOURCE, boot_id, sequence), stamp_ns, event) for sequence, event in enumerate(events)
+        Envelope(EventIdentity(SOURCE, boot_id, sequence), stamp_ns, event)
+        for sequence, event in enumerate(events, start=first_sequence)
     ]

@@ -3,9 +3,10 @@
 import logging
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from hashlib import blake2b
+from itertools import chain, islice
 from typing import cast
 
 from trigpoint.bus.event_messages import event_message
@@ -32,13 +33,14 @@ from trigpoint.observability.metrics import Instruments
 from trigpoint_optimisation.app import SOURCE, STREAM, boot_id_of, envelopes, input_positions
 from trigpoint_optimisation.core.live_fleet import LiveFleet
 from trigpoint_optimisation.core.live_state import DriveName, DrivePlace
-from trigpoint_optimisation.resuming import Resumed, resumed
+from trigpoint_optimisation.resuming import Resumed, needed_of, resumed
 from trigpoint_optimisation.settings import SolveSettings, settings_json
 from trigpoint_optimisation.whole_solve import WholeSolve, WholeSolver
 
 BATCH = 1000  # events taken at a time
 IDLE_S = 0.02  # between two looks at a log without news
 SOLVING = 2  # times its limit the graph may grow while the whole map is being solved, which may take long
+TOGETHER = 64  # events of a version appended at a time
 METHOD = "incremental"
 ODOMETRY_STREAM = STREAM_PATTERNS[OdometryCorrected]
 CORRECTIONS = (AnchorLabelled, AnchorRetracted, DriveExcluded, DriveIncluded)
@@ -218,7 +220,7 @@ class LiveOptimisation:
                 wall_s=time.monotonic() - began_s,
                 base_version=self._version,
             )
-            self._append_version((*changed, head), stamp_ns=self._newest_ns)
+            self._append_version(changed, head, stamp_ns=self._newest_ns)
         return bool(changed)
 
     def _positions(self) -> tuple[tuple[str, int], ...]:
@@ -229,12 +231,14 @@ class LiveOptimisation:
             for stream, number in input_positions(self._log)
         )
 
-    def _append_version(self, events: Sequence[Mapped], *, stamp_ns: int) -> None:
-        version = self._version + 1
-        numbered = tuple(replace(event, map_version=version) for event in events)
-        head = cast(MapSolved, numbered[-1])
+    def _append_version(self, parts: Iterable[Mapped], head: MapSolved, *, stamp_ns: int) -> None:
+        """The next version appended, few events at a time: until its head is there, nobody takes them for one."""
+        version, sequence = self._version + 1, 0
         boot_id = boot_id_of(version, head.inputs, self._settings)
-        self._say(STREAM, envelopes(numbered, boot_id=boot_id, stamp_ns=stamp_ns))
+        events = chain(parts, (head,))
+        while some := [replace(event, map_version=version) for event in islice(events, TOGETHER)]:
+            self._say(STREAM, envelopes(some, boot_id=boot_id, stamp_ns=stamp_ns, first_sequence=sequence))
+            sequence += len(some)
         self._version, self._version_inputs = version, dict(head.inputs)
         self._instruments.map_version.set(version)
 
@@ -295,21 +299,29 @@ class LiveOptimisation:
         self._instruments.solve_seconds.observe(time.monotonic() - self._solved_s)
         for line in found.left_out:
             logger.warning("%s", line)
-        if found.refusal:
+        if found.head is None:
             logger.warning("the whole map cannot be solved: %s", found.refusal)
             self._correction_s = time.monotonic() + self._settings.live.solve_interval_s  # with more data perhaps
             if self.pose_count > self._settings.live.pose_limit:
                 self._begin_again()
             return
-        self._append_version(found.events, stamp_ns=found.stamp_ns)
+        base: list[Mapped] = []
+        self._append_version(_noted(found.parts, base), found.head, stamp_ns=found.stamp_ns)
         self._solved_inputs = found.inputs
-        self._anchor_count = cast(MapSolved, found.events[-1]).anchor_count
+        self._anchor_count = found.head.anchor_count
         self._excluded = excluded_drives(logged_corrections(self._log))
         self._fleet.begin_anew(
-            [event for event in found.events if isinstance(event, LandmarkSolved)],
-            [event for event in found.events if isinstance(event, TrajectorySolved)],
+            [event for event in base if isinstance(event, LandmarkSolved)],
+            [event for event in base if isinstance(event, TrajectorySolved)],
             excluded=self._excluded,
         )
+
+
+def _noted(parts: Iterable[Mapped], base: list[Mapped]) -> Iterator[Mapped]:
+    """The events of a version as they are, noted in `base` without what is not needed to go on from it."""
+    for part in parts:
+        base.append(needed_of(part))
+        yield part
 
 
 def _is_vehicle(stream: str) -> bool:

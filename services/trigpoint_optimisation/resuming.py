@@ -1,7 +1,7 @@
 """Where live optimisation goes on: the newest map version, where drives were, and how far the log was taken in."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import cast
 
 from trigpoint.events.envelope import Envelope
@@ -41,34 +41,57 @@ def resumed(log: EventLog) -> Resumed:
     """What the log says of it."""
     begun = {stream: _newest_boot(log, stream) for stream in vehicle_streams(log)}
     vehicle_numbers = {stream: number for stream, (number, _) in begun.items()}
-    heads = [(row.position.number, row.envelope.stamp_ns, cast(MapSolved, row.envelope.event)) for row in _heads(log)]
-    if not heads:
+    newest, whole, first_number = _heads(log)
+    if newest is None or whole is None:
         return Resumed(vehicle_numbers=vehicle_numbers)
-    _, stamp_ns, newest = heads[-1]
-    whole = max((row for row in heads if not row[2].base_version), key=lambda row: row[0], default=heads[0])
-    before = max((number for number, _, _ in heads if number < whole[0]), default=-1)
-    landmarks, paths = _parts(log, before + 1)
+    stamp_ns, head = newest.envelope.stamp_ns, cast(MapSolved, newest.envelope.event)
+    before = cast(MapSolved, whole.envelope.event)
+    landmarks, paths = _parts(log, first_number)
     said = _corrections(log)
     starts = {name: solved_start(path) for name, path in paths.items() if len(path.stamp_ns)}
     for name, (said_ns, event) in said.items():
         if name not in starts or said_ns > starts[name].stamp_ns:
             starts[name] = corrected_start(said_ns, event)
     return Resumed(
-        version=newest.map_version,
+        version=head.map_version,
         landmarks=tuple(landmarks.values()),
-        anchor_count=newest.anchor_count,
+        anchor_count=head.anchor_count,
         stamp_ns=stamp_ns,
-        inputs=newest.inputs,
-        whole_inputs=() if whole[2].method == "incremental" else whole[2].inputs,
+        inputs=head.inputs,
+        whole_inputs=() if before.method == "incremental" else before.inputs,
         starts=starts,
         said_ns={name: said_ns for name, (said_ns, _) in said.items()},
         vehicle_numbers=vehicle_numbers,
-        verdict_number=dict(newest.inputs).get(VERDICT_STREAM, 0),
+        verdict_number=dict(head.inputs).get(VERDICT_STREAM, 0),
     )
 
 
-def _heads(log: EventLog) -> list[LoggedEvent]:
-    return list(log.read(STREAM, kinds=(MapSolved,)))
+def needed_of(event: Mapped) -> Mapped:
+    """What going on from a version needs of one of its events: where a landmark is, and where a path ends."""
+    if isinstance(event, LandmarkSolved):
+        return replace(event, observations=())
+    if isinstance(event, TrajectorySolved):
+        end = slice(-1, None)
+        return replace(
+            event,
+            stamp_ns=event.stamp_ns[end].copy(),
+            pose=event.pose[end].copy(),
+            covariance=event.covariance[end].copy(),
+        )
+    return event
+
+
+def _heads(log: EventLog) -> tuple[LoggedEvent | None, LoggedEvent | None, int]:
+    """The newest head, that of the newest whole version or else the first, and the number of its version's first
+    event."""
+    newest: LoggedEvent | None = None
+    whole: LoggedEvent | None = None
+    first_number = 0
+    for row in log.read(STREAM, kinds=(MapSolved,)):
+        if whole is None or not cast(MapSolved, row.envelope.event).base_version:
+            whole, first_number = row, 0 if newest is None else newest.position.number + 1
+        newest = row
+    return newest, whole, first_number
 
 
 def _parts(log: EventLog, first_number: int) -> tuple[dict[str, LandmarkSolved], dict[DriveName, TrajectorySolved]]:
@@ -76,7 +99,8 @@ def _parts(log: EventLog, first_number: int) -> tuple[dict[str, LandmarkSolved],
     landmarks: dict[str, LandmarkSolved] = {}
     paths: dict[DriveName, TrajectorySolved] = {}
     kinds = (LandmarkSolved, TrajectorySolved, MapSolved)
-    rows = (cast(Envelope[Mapped], row.envelope) for row in log.read(STREAM, first_number=first_number, kinds=kinds))
+    logged = (cast(Envelope[Mapped], row.envelope) for row in log.read(STREAM, first_number=first_number, kinds=kinds))
+    rows = (replace(row, event=needed_of(row.event)) for row in logged)
     for head, events in closed_versions(rows):
         landmarks |= {event.landmark: event for event in events if isinstance(event, LandmarkSolved)}
         paths |= {(event.vehicle, event.boot_id): event for event in events if isinstance(event, TrajectorySolved)}

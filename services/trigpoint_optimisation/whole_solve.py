@@ -4,13 +4,14 @@ import multiprocessing
 import os
 import threading
 import time
+from collections.abc import Generator, Iterable
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from trigpoint.errors import InputError, ServiceError
-from trigpoint.events.mapped import Mapped
+from trigpoint.events.mapped import Mapped, MapSolved
 from trigpoint.logs.mcap_log import McapLog
 from trigpoint.logs.ports import EventLog
 from trigpoint.logs.readings import logged_anchors, logged_drives, logged_frame, logged_verdicts
@@ -19,17 +20,20 @@ from trigpoint_optimisation.core.solve import solve_map
 from trigpoint_optimisation.settings import SolveSettings
 
 ASKER_GONE = 1  # exit status
+END = "end"  # what a solving process says last
 
 Inputs = tuple[tuple[str, int], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WholeSolve:
-    """A map solved from everything up to `inputs`: its events of version UNNUMBERED, the head last, and the newest
-    measurement among them; or why there is none."""
+    """A map solved from everything up to `inputs`: its head and its other events, of version UNNUMBERED, and the newest
+    measurement among them; or why there is none. The events can be gone through once: with the years of a fleet they
+    are more than a service should hold."""
 
     inputs: Inputs
-    events: tuple[Mapped, ...] = ()
+    head: MapSolved | None = None
+    parts: Iterable[Mapped] = ()
     stamp_ns: int = 0
     left_out: tuple[str, ...] = ()
     refusal: str = ""
@@ -64,7 +68,8 @@ def whole_solve(log: EventLog, settings: SolveSettings) -> WholeSolve:
         return WholeSolve(inputs=inputs, refusal=str(error))
     head = replace(solution.map.head, inputs=inputs, wall_s=time.monotonic() - begun_s)
     left_out = tuple(str(one) for one in solution.left_out)
-    return WholeSolve(inputs=inputs, events=(*events[:-1], head), stamp_ns=last_seen_ns(solution), left_out=left_out)
+    stamp_ns = last_seen_ns(solution)
+    return WholeSolve(inputs=inputs, head=head, parts=events[:-1], stamp_ns=stamp_ns, left_out=left_out)
 
 
 class SolverInPlace:
@@ -111,20 +116,16 @@ class SolverProcess:
         self._solving, self._answers = process, ours
 
     def result(self) -> WholeSolve | None:
-        """What the process said, if it has; then it is gone."""
+        """What the process says, if it has begun to; its parts come from it one by one."""
         solving, answers = self._solving, self._answers
         if solving is None or answers is None or not answers.poll():
             return None
-        try:
-            found: WholeSolve = answers.recv()
-        except EOFError as error:
-            solving.join()
-            raise ServiceError(f"the solving process ended with status {solving.exitcode}") from error
-        finally:
-            answers.close()
-            self._solving = self._answers = None
-        solving.join()
-        return found
+        self._solving = self._answers = None
+        said = _said(solving, answers)
+        found: WholeSolve = next(said)
+        if found.head is None:
+            said.close()
+        return replace(found, parts=said)
 
     def close(self) -> None:
         """The process under way, if any, ended."""
@@ -133,6 +134,19 @@ class SolverProcess:
             self._solving.join()
             self._answers.close()
             self._solving = self._answers = None
+
+
+def _said(solving: multiprocessing.process.BaseProcess, answers: Connection) -> Generator[Any, None, None]:
+    """What a process says, to its END; then it is gone. Raises ServiceError where it died before."""
+    try:
+        with answers:
+            while (said := answers.recv()) != END:
+                yield said
+    except EOFError as error:
+        solving.join()
+        raise ServiceError(f"the solving process ended with status {solving.exitcode}") from error
+    finally:
+        solving.join()
 
 
 def _solve_for(directory: Path, settings: SolveSettings, answers: Connection) -> None:
@@ -145,7 +159,9 @@ def _solve_for(directory: Path, settings: SolveSettings, answers: Connection) ->
     finally:
         log.close()
     with answers:
-        answers.send(found)
+        answers.send(replace(found, parts=()))
+        for said in (*found.parts, END):
+            answers.send(said)
 
 
 def _end_with_whoever_asked() -> None:
