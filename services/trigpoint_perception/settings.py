@@ -64,6 +64,34 @@ class WallSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TrackSettings:
+    """What becomes an observation: a thing seen in `seen_min` of `window` sweeps that did not move meanwhile."""
+
+    window: int = 5
+    seen_min: int = 3
+    gate_m: float = 0.5
+    gate_chi_square: float = 13.8  # 2 degrees of freedom, 99.9 %
+    moved_max_m: float = 0.35  # a thing's drift over its window, in the odometry's frame
+    forgotten_after: int = 10  # sweeps without a sight of it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OdometrySettings:
+    """How sweeps are matched; tuned on KITTI 0005."""
+
+    voxel_m: float = 1.0
+    downsampled_m: float = 0.5
+    reach_m: float = 1.0  # between a point and its partner
+    share_min: float = 0.3  # of points with a partner
+    sigma_max_m: float = 0.5  # along the loosest direction
+    inflation: float = 20.0
+    floor_sigma_m: float = 0.01
+    floor_sigma_rad: float = 0.0007
+    share_of_distance: float = 0.01
+    gap_max_s: float = 2.0  # between two sweeps: more, or a step back, begins a new map
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PerceptionSettings:
     """All of it."""
 
@@ -71,3 +99,5 @@ class PerceptionSettings:
     ground: GroundSettings = field(default_factory=GroundSettings)
     pole: PoleSettings = field(default_factory=PoleSettings)
     wall: WallSettings = field(default_factory=WallSettings)
+    track: TrackSettings = field(default_factory=TrackSettings)
+    odometry: OdometrySettings = field(default_factory=OdometrySettings)

@@ -33,6 +33,7 @@ from trigpoint.events.observed import (
     WheelPairMeasured,
     WheelSpeedMeasured,
 )
+from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched
 from trigpoint.events.scanned import PointsScanned
 
 T = TypeVar("T")
@@ -40,6 +41,7 @@ T = TypeVar("T")
 VEHICLE = "trigpoint_vehicle"
 INGEST = "trigpoint_ingest"
 FILTERING = "trigpoint_filtering"
+PERCEPTION = "trigpoint_perception"
 OPTIMISATION = "trigpoint_optimisation"
 LANDMARKS = "trigpoint_landmarks"
 EVALUATION = "trigpoint_evaluation"
@@ -78,22 +80,24 @@ class Flow:
 
 
 FLOWS: tuple[Flow, ...] = (
-    Flow(VehicleDescribed, INGEST, (FILTERING, OPTIMISATION, EVALUATION), sender=VEHICLE),
-    Flow(WheelSpeedMeasured, INGEST, (FILTERING, OPTIMISATION, EVALUATION), sender=VEHICLE),
-    Flow(WheelPairMeasured, INGEST, (FILTERING, OPTIMISATION, EVALUATION), sender=VEHICLE),
-    Flow(ImuMeasured, INGEST, (FILTERING, OPTIMISATION, EVALUATION), sender=VEHICLE),
+    Flow(VehicleDescribed, INGEST, (FILTERING, PERCEPTION, OPTIMISATION, EVALUATION), sender=VEHICLE),
+    Flow(WheelSpeedMeasured, INGEST, (FILTERING, PERCEPTION, OPTIMISATION, EVALUATION), sender=VEHICLE),
+    Flow(WheelPairMeasured, INGEST, (FILTERING, PERCEPTION, OPTIMISATION, EVALUATION), sender=VEHICLE),
+    Flow(ImuMeasured, INGEST, (FILTERING, PERCEPTION, OPTIMISATION, EVALUATION), sender=VEHICLE),
     Flow(GnssFixReceived, INGEST, (FILTERING, OPTIMISATION, EVALUATION), sender=VEHICLE),
     Flow(LandmarksDetected, INGEST, (OPTIMISATION, LANDMARKS, EVALUATION), sender=VEHICLE),
-    Flow(PointsScanned, INGEST, (), sender=VEHICLE),
+    Flow(PointsScanned, INGEST, (PERCEPTION,), sender=VEHICLE),
     Flow(EventRefused, INGEST, (EVALUATION,)),
     Flow(MapFramePinned, INGEST, (FILTERING, OPTIMISATION, LANDMARKS, EVALUATION)),
     Flow(AnchorLabelled, INGEST, (OPTIMISATION, LANDMARKS, EVALUATION)),
     Flow(AnchorRetracted, INGEST, (OPTIMISATION, LANDMARKS, EVALUATION)),
-    Flow(DriveExcluded, INGEST, (OPTIMISATION, EVALUATION)),
-    Flow(DriveIncluded, INGEST, (OPTIMISATION, EVALUATION)),
+    Flow(DriveExcluded, INGEST, (PERCEPTION, OPTIMISATION, EVALUATION)),
+    Flow(DriveIncluded, INGEST, (PERCEPTION, OPTIMISATION, EVALUATION)),
     Flow(FixJudged, FILTERING, (OPTIMISATION, EVALUATION)),
     Flow(PoseFiltered, FILTERING, (EVALUATION,)),
     Flow(GateAlarmed, FILTERING, (EVALUATION,)),
+    Flow(LandmarksPerceived, PERCEPTION, ()),
+    Flow(OdometryMatched, PERCEPTION, ()),
     Flow(TrajectorySolved, OPTIMISATION, (LANDMARKS, EVALUATION)),
     Flow(LandmarkSolved, OPTIMISATION, (LANDMARKS, EVALUATION)),
     Flow(AnchorAssociated, OPTIMISATION, (LANDMARKS, EVALUATION)),

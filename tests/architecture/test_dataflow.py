@@ -12,12 +12,12 @@ import pytest
 from trigpoint import dataflow
 from trigpoint.bus import access
 from trigpoint.bus.key_expressions import key_matches
-from trigpoint.events import corrected, estimated, keys, mapped, observed, scanned
+from trigpoint.events import corrected, estimated, keys, mapped, observed, perceived, scanned
 from trigpoint_schemas.v1 import asked_pb2
 
 REPOSITORY = Path(__file__).parents[2]
 SERVICES = sorted(path.name for path in (REPOSITORY / "services").iterdir() if path.is_dir())
-PARTS_OF_EVENTS = {observed.LandmarkDetection}  # a value inside an event
+PARTS_OF_EVENTS = {observed.LandmarkDetection, perceived.PerceivedLandmark}  # values inside an event
 
 
 def declared(service: str, heading: str) -> set[str]:
@@ -59,7 +59,7 @@ def test_a_stream_has_one_writer() -> None:
 
 
 def test_every_event_class_is_in_the_table() -> None:
-    classes = set().union(*(events_of(module) for module in (observed, scanned, corrected, estimated, mapped)))
+    classes = set().union(*(events_of(module) for module in (observed, scanned, corrected, estimated, perceived, mapped)))
     assert classes == {flow.event for flow in dataflow.FLOWS}
 
 

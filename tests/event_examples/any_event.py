@@ -31,6 +31,7 @@ from trigpoint.events.observed import (
     WheelPairMeasured,
     WheelSpeedMeasured,
 )
+from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched, PerceivedLandmark
 from trigpoint.events.scanned import PointsScanned
 
 any_float = st.floats()
@@ -125,6 +126,29 @@ ANY_EVENT: dict[type, SearchStrategy[object]] = {
         speed_mps=any_float,
         covariance=_array(3, 3),
     ),
+    LandmarksPerceived: st.builds(
+        LandmarksPerceived,
+        vehicle=any_text,
+        boot_id=any_text,
+        sensor=any_text,
+        sweep_sequence=any_int,
+        refusal=any_text,
+        landmarks=st.lists(_flat(PerceivedLandmark), max_size=3).map(tuple),
+    ),
+    OdometryMatched: st.builds(
+        OdometryMatched,
+        vehicle=any_text,
+        boot_id=any_text,
+        sensor=any_text,
+        from_sequence=any_int,
+        from_stamp_ns=any_int,
+        sweep_sequence=any_int,
+        x_m=any_float,
+        y_m=any_float,
+        heading_rad=any_float,
+        covariance=_array(3, 3),
+        matched_share=any_float,
+    ),
     MapSolved: st.builds(
         MapSolved,
         map_version=any_int,
@@ -198,7 +222,7 @@ def same_value(left: object, right: object) -> bool:
         return same_kind and bool(np.array_equal(left, right, equal_nan=left.dtype.kind == "f"))
     if isinstance(left, tuple) and isinstance(right, tuple):
         return len(left) == len(right) and all(map(same_value, left, right))
-    if isinstance(left, LandmarkDetection):
+    if isinstance(left, LandmarkDetection | PerceivedLandmark):
         return same_fields(left, right)
     return left == right
 

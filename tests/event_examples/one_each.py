@@ -28,6 +28,7 @@ from trigpoint.events.observed import (
     WheelPairMeasured,
     WheelSpeedMeasured,
 )
+from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched, PerceivedLandmark
 from trigpoint.events.scanned import PointsScanned
 
 EVENTS: tuple[Event, ...] = (
@@ -98,6 +99,54 @@ EVENTS: tuple[Event, ...] = (
         covariance=np.arange(9.0).reshape(3, 3),
     ),
     GateAlarmed(vehicle="van", boot_id="boot-1", reason="rejects everything", duration_s=31.0),
+    LandmarksPerceived(
+        vehicle="van",
+        boot_id="boot-1",
+        sensor="roof",
+        sweep_sequence=12,
+        refusal="",
+        landmarks=(
+            PerceivedLandmark(
+                kind="pole",
+                landmark_class="trunk",
+                track=3,
+                x_m=8.5,
+                y_m=-2.25,
+                variance_x_m2=0.01,
+                covariance_xy_m2=-0.002,
+                variance_y_m2=0.004,
+                height_m=4.5,
+                diameter_m=0.3,
+                points=48,
+            ),
+            PerceivedLandmark(
+                kind="corner",
+                landmark_class="corner",
+                track=4,
+                x_m=12.0,
+                y_m=6.0,
+                variance_x_m2=0.002,
+                covariance_xy_m2=0.0,
+                variance_y_m2=0.002,
+                height_m=6.5,
+                diameter_m=math.nan,
+                points=0,
+            ),
+        ),
+    ),
+    OdometryMatched(
+        vehicle="van",
+        boot_id="boot-1",
+        sensor="roof",
+        from_sequence=11,
+        from_stamp_ns=1_700_000_000_000_000_000,
+        sweep_sequence=12,
+        x_m=0.75,
+        y_m=0.01,
+        heading_rad=0.002,
+        covariance=np.diag([1e-4, 2e-4, 1e-6]),
+        matched_share=0.93,
+    ),
     MapSolved(
         map_version=3,
         method="anchored",

@@ -15,12 +15,12 @@ SAME_CORNER_M = 0.6  # two pairs of walls whose corners are nearer than this sha
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PerceivedCorner:
-    """A building's corner in the base frame (2,) with covariance (2, 2) in m^2; the lower wall's top above ground."""
+    """A building's corner in the base frame (2,) with covariance (2, 2) in m^2; the lower wall's top above ground; `points` on both walls."""
 
     position_m: Floats
     covariance_m2: Floats
     top_m: float
-    rings: int
+    points: int
 
 
 def perceived_corners(walls: Walls, settings: WallSettings) -> tuple[PerceivedCorner, ...]:
@@ -56,7 +56,7 @@ def _corner(walls: Walls, one: int, other: int, settings: WallSettings) -> Perce
         position_m=walls.middle_m[one] + along_first_m * first,
         covariance_m2=solved @ np.diag(variance_m2) @ solved.T + settings.systematic_sigma_m**2 * np.eye(2),
         top_m=float(min(walls.top_m[one], walls.top_m[other])),
-        rings=int(min(walls.rings[one], walls.rings[other])),
+        points=int(walls.points[one] + walls.points[other]),
     )
 
 

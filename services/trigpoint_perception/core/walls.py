@@ -26,7 +26,7 @@ SUMS = 9  # n, x, y, xx, xy, yy, top, lowest ring, highest ring
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Walls:
     """Walls (m,): middle_m (m, 2) and unit direction (m, 2) in the base frame, begin and end along it (m,) from the
-    middle; 1-sigma of the offset across (m,) in m and of the direction (m,) in rad; top above the ground, rings."""
+    middle; 1-sigma of the offset across (m,) in m and of the direction (m,) in rad; top above the ground, points."""
 
     middle_m: Floats
     direction: Floats
@@ -35,7 +35,7 @@ class Walls:
     offset_sigma_m: Floats
     direction_sigma_rad: Floats
     top_m: Floats
-    rings: Ints
+    points: Ints
 
 
 def walls_of(ordered: OrderedSweep, sensor_m: Floats, settings: WallSettings) -> Walls:
@@ -81,7 +81,7 @@ def _kept(sums: Floats, extent: Floats, settings: WallSettings) -> Walls:
         offset_sigma_m=sigma_m[kept],
         direction_sigma_rad=(sigma_m * np.sqrt(12.0) / np.maximum(length_m, 1e-9))[kept],
         top_m=sums[kept, 6],
-        rings=rings[kept],
+        points=sums[kept, 0].astype(np.int64),
     )
 
 

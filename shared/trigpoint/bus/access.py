@@ -73,6 +73,13 @@ FILTERING = Grant(
     watch=("live/**",),
     hear_of=("**",),
 )
+PERCEPTION = Grant(
+    publish=("veh/*/perc/**",),
+    listen=("veh/*/obs/**", "map/**"),
+    claim=("live/perception/**",),
+    watch=("live/**",),
+    hear_of=("**",),
+)
 OPTIMISATION = Grant(
     publish=(
         "map/*/trajectory/*",
@@ -115,11 +122,12 @@ GRANTS: Mapping[Role, Grant] = {
     Role.CLIENT: CLIENT,
     Role.INGEST: INGEST,
     Role.FILTERING: FILTERING,
+    Role.PERCEPTION: PERCEPTION,
     Role.OPTIMISATION: OPTIMISATION,
     Role.LANDMARKS: LANDMARKS,
     Role.ANSWERS: ANSWERS,
     Role.HTTP: CLIENT,
-    Role.SERVICE: INGEST.joined(FILTERING, OPTIMISATION, LANDMARKS, ANSWERS),
+    Role.SERVICE: INGEST.joined(FILTERING, PERCEPTION, OPTIMISATION, LANDMARKS, ANSWERS),
     Role.ROUTER: Grant(everything=("**",)),
 }
 

@@ -23,6 +23,7 @@ class Role(StrEnum):
     VEHICLE = "vehicle"
     INGEST = "ingest"
     FILTERING = "filtering"
+    PERCEPTION = "perception"
     OPTIMISATION = "optimisation"
     LANDMARKS = "landmarks"
     ANSWERS = "answers"

@@ -16,8 +16,9 @@ from trigpoint.events.estimated import Estimated
 from trigpoint.events.forms import FORMS, Form
 from trigpoint.events.mapped import Mapped, OdometryCorrected
 from trigpoint.events.observed import EventRefused, MapFramePinned, Observed
+from trigpoint.events.perceived import Perceived
 
-Event = Observed | EventRefused | MapFramePinned | Corrected | Estimated | Mapped | OdometryCorrected
+Event = Observed | EventRefused | MapFramePinned | Corrected | Estimated | Perceived | Mapped | OdometryCorrected
 
 CURRENT_VERSION = 1  # of the package trigpoint.v<version>
 

@@ -36,8 +36,10 @@ from trigpoint.events.observed import (
     WheelPairMeasured,
     WheelSpeedMeasured,
 )
+from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched
+from trigpoint.events.perceived_forms import perceived_event, perceived_message
 from trigpoint.events.scanned import PointsScanned
-from trigpoint_schemas.v1 import corrected_pb2, estimated_pb2, mapped_pb2, observed_pb2
+from trigpoint_schemas.v1 import corrected_pb2, estimated_pb2, mapped_pb2, observed_pb2, perceived_pb2
 
 EventT = TypeVar("EventT")
 MessageT = TypeVar("MessageT", bound=Message)
@@ -99,6 +101,22 @@ def _array(values: Sequence[float], shape: tuple[int, ...]) -> Floats:
     return array if len(shape) == 1 else array.reshape(shape)
 
 
+def _with_covariance(event_class: type[EventT], message_class: type[MessageT]) -> Form[EventT, MessageT]:
+    """The form of an event whose fields are scalars, but for a covariance (3, 3)."""
+    names = [field.name for field in fields(event_class) if field.name != "covariance"]  # type: ignore[arg-type]
+    values_of, covariance_of = attrgetter(*names), attrgetter("covariance")
+
+    def message_of(event: EventT) -> MessageT:
+        scalars = dict(zip(names, values_of(event), strict=True))
+        return message_class(**scalars, covariance=_listed(covariance_of(event), (3, 3)))
+
+    def event_of(message: MessageT) -> EventT:
+        scalars = dict(zip(names, values_of(message), strict=True))
+        return event_class(**scalars, covariance=_array(covariance_of(message), (3, 3)))
+
+    return Form(event_class, message_class, message_of, event_of)
+
+
 def _fix_message(event: GnssFixReceived) -> LocationFix:
     """The variance's sign is sigma's, so that even a nonsensical sigma comes back as it was sent."""
     message = LocationFix(latitude=event.lat_deg, longitude=event.lon_deg, altitude=event.height_m)
@@ -143,30 +161,6 @@ def _sweep_event(message: observed_pb2.LandmarksDetected) -> LandmarksDetected:
             LandmarkDetection(seen.range_m, seen.bearing_rad, seen.kind, seen.signature, seen.diameter_m)
             for seen in message.detections
         )
-    )
-
-
-def _pose_message(event: PoseFiltered) -> estimated_pb2.PoseFiltered:
-    return estimated_pb2.PoseFiltered(
-        vehicle=event.vehicle,
-        boot_id=event.boot_id,
-        x_m=event.x_m,
-        y_m=event.y_m,
-        heading_rad=event.heading_rad,
-        speed_mps=event.speed_mps,
-        covariance=_listed(event.covariance, (3, 3)),
-    )
-
-
-def _pose_event(message: estimated_pb2.PoseFiltered) -> PoseFiltered:
-    return PoseFiltered(
-        vehicle=message.vehicle,
-        boot_id=message.boot_id,
-        x_m=message.x_m,
-        y_m=message.y_m,
-        heading_rad=message.heading_rad,
-        speed_mps=message.speed_mps,
-        covariance=_array(message.covariance, (3, 3)),
     )
 
 
@@ -359,8 +353,10 @@ FORMS: tuple[Form[Any, Any], ...] = (
     _flat(DriveExcluded, corrected_pb2.DriveExcluded),
     _flat(DriveIncluded, corrected_pb2.DriveIncluded),
     _flat(FixJudged, estimated_pb2.FixJudged),
-    Form(PoseFiltered, estimated_pb2.PoseFiltered, _pose_message, _pose_event),
+    _with_covariance(PoseFiltered, estimated_pb2.PoseFiltered),
     _flat(GateAlarmed, estimated_pb2.GateAlarmed),
+    Form(LandmarksPerceived, perceived_pb2.LandmarksPerceived, perceived_message, perceived_event),
+    _with_covariance(OdometryMatched, perceived_pb2.OdometryMatched),
     Form(MapSolved, mapped_pb2.MapSolved, _map_message, _map_event),
     Form(TrajectorySolved, mapped_pb2.TrajectorySolved, _trajectory_message, _trajectory_event),
     Form(LandmarkSolved, mapped_pb2.LandmarkSolved, _landmark_message, _landmark_event),

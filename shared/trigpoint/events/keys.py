@@ -27,12 +27,23 @@ from trigpoint.events.observed import (
     WheelPairMeasured,
     WheelSpeedMeasured,
 )
+from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched
 from trigpoint.events.scanned import PointsScanned
 from trigpoint.geodesy.positions import MapPosition
 from trigpoint.geodesy.web_tiles import tile_at
 
 if TYPE_CHECKING:
     from trigpoint.geodesy.projection import MapFrame
+
+VEHICLE_NAMING = (
+    FixJudged,
+    PoseFiltered,
+    GateAlarmed,
+    LandmarksPerceived,
+    OdometryMatched,
+    TrajectorySolved,
+    OdometryCorrected,
+)
 
 DEFAULT_ROOT = "trigpoint"
 DEFAULT_MAP = "main"
@@ -58,6 +69,8 @@ KEY_PATTERNS: Mapping[type, str] = {
     FixJudged: "veh/{vehicle}/est/fix",
     PoseFiltered: "veh/{vehicle}/est/pose",
     GateAlarmed: "veh/{vehicle}/est/gate",
+    LandmarksPerceived: "veh/{vehicle}/perc/landmarks",
+    OdometryMatched: "veh/{vehicle}/perc/odometry",
     TrajectorySolved: "map/{map}/trajectory/{vehicle}",
     LandmarkSolved: "map/{map}/lm/{zoom}/{column}/{row}",
     AnchorAssociated: "map/{map}/association",
@@ -88,6 +101,8 @@ STREAM_PATTERNS: Mapping[type, str] = {
     FixJudged: "filtering",
     PoseFiltered: "filtering",
     GateAlarmed: "filtering",
+    LandmarksPerceived: "perception",
+    OdometryMatched: "perception",
     TrajectorySolved: "optimisation",
     LandmarkSolved: "optimisation",
     AnchorAssociated: "optimisation",
@@ -113,7 +128,7 @@ def valid_name(name: str) -> str:
 def vehicle_of(envelope: Envelope[object]) -> str:
     """The vehicle an event is about: the one it names, else its source."""
     event = envelope.event
-    if isinstance(event, FixJudged | PoseFiltered | GateAlarmed | TrajectorySolved | OdometryCorrected):
+    if isinstance(event, VEHICLE_NAMING):
         return event.vehicle
     return envelope.identity.source
 

@@ -14,6 +14,7 @@ ROOT = "fleet"
 ON_THE_BUS = {
     "trigpoint_ingest": Role.INGEST,
     "trigpoint_filtering": Role.FILTERING,
+    "trigpoint_perception": Role.PERCEPTION,
     "trigpoint_optimisation": Role.OPTIMISATION,
     "trigpoint_landmarks": Role.LANDMARKS,
     "trigpoint_vehicle": Role.VEHICLE,

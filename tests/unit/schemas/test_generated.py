@@ -9,7 +9,7 @@ def test_the_generated_code_is_what_the_schemas_say() -> None:
 
 def test_there_is_one_schema_file_for_each_module_of_events_and_one_for_questions() -> None:
     names = {path.stem for path in proto_files()}
-    assert names - {"asked"} == {"observed", "corrected", "estimated", "mapped"}
+    assert names - {"asked"} == {"observed", "corrected", "estimated", "perceived", "mapped"}
 
 
 def test_check_ends_with_status_0_when_nothing_is_stale() -> None:

@@ -1,0 +1,86 @@
+"""Points brought to where they would have been measured had the vehicle stood still at the sweep's stamp."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from trigpoint.errors import EventRejected
+from trigpoint_perception.core.compiled import compiled
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+SLOT_NS = 200_000  # points of so short a time share one pose: 4 mm at 20 m/s
+REACH_NS = 150_000_000  # beyond a path's ends its motion is taken to go on: one sweep
+NS_PER_S = 1e9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Path:
+    """Poses of the base at rising stamps (n,), n at least 2: position_m (n, 3) and rotation in any fixed frame."""
+
+    stamp_ns: Ints
+    position_m: Floats
+    rotation: Rotation
+
+
+def planar_path(stamp_ns: Ints, pose: Floats) -> Path:
+    """The path of a base that keeps level; pose (n, 3): x, y in m, heading in rad, as maps and odometry have it.
+
+    Raises EventRejected "no path" for fewer than two poses or stamps that do not rise.
+    """
+    if len(stamp_ns) < 2 or not np.all(np.diff(stamp_ns) > 0):
+        raise EventRejected("no path", f"{len(stamp_ns)} poses with stamps in order: at least 2 that rise are needed")
+    position_m = np.column_stack([pose[:, :2], np.zeros(len(pose))])
+    return Path(stamp_ns=stamp_ns, position_m=position_m, rotation=Rotation.from_euler("z", pose[:, 2:3]))
+
+
+def poses_at(path: Path, stamp_ns: Ints) -> tuple[Floats, Floats]:
+    """Positions (m, 3) and rotation matrices (m, 3, 3) at stamps (m,), interpolated: straight, and turning evenly.
+
+    Up to REACH_NS beyond its ends the path goes on as it was. Raises EventRejected "no path" farther away.
+    """
+    first_ns, last_ns = int(path.stamp_ns[0]), int(path.stamp_ns[-1])
+    if int(stamp_ns.min()) < first_ns - REACH_NS or int(stamp_ns.max()) > last_ns + REACH_NS:
+        raise EventRejected(
+            "no path",
+            f"points of {int(stamp_ns.min())} to {int(stamp_ns.max())} ns, and the path is known of "
+            f"{first_ns} to {last_ns} ns",
+        )
+    t_s, at_s = (path.stamp_ns - first_ns) / NS_PER_S, (stamp_ns - first_ns) / NS_PER_S
+    after = np.clip(np.searchsorted(t_s, at_s), 1, len(t_s) - 1)
+    share = ((at_s - t_s[after - 1]) / (t_s[after] - t_s[after - 1]))[:, None]
+    position_m = path.position_m[after - 1] + share * (path.position_m[after] - path.position_m[after - 1])
+    before, next_ = path.rotation[after - 1], path.rotation[after]
+    turn = (before.inv() * next_).as_rotvec()
+    return position_m, (before * Rotation.from_rotvec(share * turn)).as_matrix()
+
+
+def deskewed(point_m: Floats, offset_ns: Ints, *, stamp_ns: int, path: Path) -> Floats:
+    """Points (n, 3) in the base frame at the sweep's stamp, from points each in the base frame at its own time.
+
+    Raises EventRejected "no path" where the path does not cover the sweep.
+    """
+    first_ns, last_ns = int(offset_ns.min()), int(offset_ns.max())
+    slots = (last_ns - first_ns) // SLOT_NS + 1
+    middle_ns = first_ns + SLOT_NS * np.arange(slots, dtype=np.int64) + SLOT_NS // 2
+    if slots == 1:
+        middle_ns = np.array([(first_ns + last_ns) // 2], dtype=np.int64)
+    position_m, rotation = poses_at(path, np.append(stamp_ns + middle_ns, np.int64(stamp_ns)))
+    to_stamp = rotation[-1].T
+    moved_m = (position_m[:-1] - position_m[-1]) @ to_stamp.T
+    return _moved(point_m, (offset_ns - first_ns) // SLOT_NS, moved_m, to_stamp @ rotation[:-1])
+
+
+@compiled
+def _moved(point_m: Floats, slot: Ints, moved_m: Floats, turned: Floats) -> Floats:
+    result = np.empty_like(point_m)
+    for row in range(len(point_m)):
+        number = slot[row]
+        for axis in range(3):
+            result[row, axis] = moved_m[number, axis]
+            for other in range(3):
+                result[row, axis] += turned[number, axis, other] * point_m[row, other]
+    return result

@@ -1,0 +1,246 @@
+"""A drive's sweeps taken one after the other: deskewed, searched, matched, tracked, and told as events."""
+
+from collections import deque
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from trigpoint.errors import EventRejected
+from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched, Perceived, PerceivedLandmark
+from trigpoint.events.scanned import PointsScanned
+from trigpoint_perception.core.deskew import NS_PER_S, Path, deskewed, poses_at
+from trigpoint_perception.core.odometry import (
+    LidarOdometry,
+    Match,
+    expected_motion,
+    planar_pose,
+    relative_pose,
+    velocity_of,
+)
+from trigpoint_perception.core.perceiving import sights_of
+from trigpoint_perception.core.sweep import Sweep, usable_sweep
+from trigpoint_perception.core.tracks import Sight, Track, Tracks, class_of, followed
+from trigpoint_perception.settings import PerceptionSettings
+
+Floats = NDArray[np.float64]
+
+VELOCITY_SPAN_S = 0.1  # over which a velocity is written as a path
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NumberedSweep:
+    """A sweep as the log has it: its sequence in the vehicle's boot, and its stamp."""
+
+    sequence: int
+    stamp_ns: int
+    scanned: PointsScanned
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Counts:
+    """What became of the sweeps so far: taken, refused by reason, begun anew for a clock jump or a gap, not matched."""
+
+    sweeps: int = 0
+    refused: tuple[tuple[str, int], ...] = ()
+    restarts: int = 0
+    unmatched: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class _Waiting:
+    """A sweep that waits for the ones after it to confirm what was seen in it."""
+
+    numbered: NumberedSweep
+    refusal: str = ""
+    sights: tuple[Sight, ...] = ()
+    tracks: tuple[int, ...] = ()
+    odometry: OdometryMatched | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Placed:
+    """The last sweep that was matched."""
+
+    sequence: int
+    stamp_ns: int
+    match: Match
+
+
+class SweepFollower:
+    """Follows one sensor of one drive. The same sweeps give the same events; each sweep one LandmarksPerceived."""
+
+    def __init__(self, vehicle: str, boot_id: str, settings: PerceptionSettings, *, wheels: Path | None = None) -> None:
+        """`wheels`: the base's path by dead reckoning, where there is one; else motion is taken to go on as it was."""
+        self._vehicle, self._boot_id, self._settings, self._wheels = vehicle, boot_id, settings, wheels
+        self._odometry = LidarOdometry(settings.odometry)
+        self._tracks = Tracks()
+        self._last: _Placed | None = None
+        self._velocity: Floats | None = None
+        self._waiting: deque[_Waiting] = deque()
+        self.counts = Counts()
+
+    def take(self, numbered: NumberedSweep) -> tuple[tuple[int, Perceived], ...]:
+        """Events with their stamps that are certain after one more sweep, those of earlier sweeps first."""
+        restarted: tuple[tuple[int, Perceived], ...] = ()
+        self.counts = replace(self.counts, sweeps=self.counts.sweeps + 1)
+        if self._is_apart(numbered.stamp_ns):
+            restarted = self._restarted()
+        try:
+            self._waiting.append(self._seen(numbered))
+        except EventRejected as error:
+            self._waiting.append(_Waiting(numbered, str(error)))
+            self._count_refusal(error.reason)
+        ready = len(self._waiting) - self._settings.track.window + 1
+        return (*restarted, *(each for _ in range(ready) for each in self._told(self._waiting.popleft())))
+
+    def finished(self) -> tuple[tuple[int, Perceived], ...]:
+        """The events of the sweeps that still waited."""
+        told = tuple(each for waiting in self._waiting for each in self._told(waiting))
+        self._waiting.clear()
+        return told
+
+    def _is_apart(self, stamp_ns: int) -> bool:
+        """Whether a stamp is not shortly after the last sweep's: the clock jumped, or sweeps are missing."""
+        if self._last is None:
+            return False
+        gap_s = (stamp_ns - self._last.stamp_ns) / NS_PER_S
+        return not 0.0 < gap_s <= self._settings.odometry.gap_max_s
+
+    def _restarted(self) -> tuple[tuple[int, Perceived], ...]:
+        told = self.finished()
+        self._odometry = LidarOdometry(self._settings.odometry)
+        self._tracks = Tracks(next_number=self._tracks.next_number)
+        self._last = None
+        self.counts = replace(self.counts, restarts=self.counts.restarts + 1)
+        return told
+
+    def _count_refusal(self, reason: str) -> None:
+        counted = dict(self.counts.refused)
+        counted[reason] = counted.get(reason, 0) + 1
+        self.counts = replace(self.counts, refused=tuple(sorted(counted.items())))
+
+    def _seen(self, numbered: NumberedSweep) -> _Waiting:
+        """One sweep searched, matched and tracked. Raises EventRejected where it is not usable; nothing changed then."""
+        sweep = self._still(usable_sweep(numbered.scanned, self._settings.sweep), numbered.stamp_ns)
+        sights = sights_of(sweep, self._settings)
+        match = self._odometry.matched(sweep.point_m, self._expected(numbered.stamp_ns))
+        odometry = self._odometry_event(numbered, match)
+        placed = _Placed(numbered.sequence, numbered.stamp_ns, match)
+        self._remember_velocity(placed)
+        self._last = placed
+        self._tracks, numbers = followed(
+            self._tracks,
+            sights,
+            planar_pose(match.T_odom_base),
+            sweep=self.counts.sweeps,
+            settings=self._settings.track,
+        )
+        return _Waiting(numbered, "", sights, numbers, odometry)
+
+    def _still(self, sweep: Sweep, stamp_ns: int) -> Sweep:
+        """The sweep as if the base had stood at its stamp, as well as its motion is known beforehand."""
+        if not sweep.offset_ns.any():
+            return sweep
+        if self._wheels is not None and self._is_covered(sweep, stamp_ns):
+            path = self._wheels
+        elif self._velocity is not None:
+            path = _path_of(self._velocity, stamp_ns)
+        else:
+            return sweep
+        return replace(sweep, point_m=deskewed(sweep.point_m, sweep.offset_ns, stamp_ns=stamp_ns, path=path))
+
+    def _is_covered(self, sweep: Sweep, stamp_ns: int) -> bool:
+        wheels = self._wheels
+        first_ns, last_ns = stamp_ns + int(sweep.offset_ns.min()), stamp_ns + int(sweep.offset_ns.max())
+        return wheels is not None and int(wheels.stamp_ns[0]) <= first_ns and last_ns <= int(wheels.stamp_ns[-1])
+
+    def _expected(self, stamp_ns: int) -> Floats:
+        """Where the base is expected (4, 4): moved on by the wheels, or as it moved before."""
+        last = self._last
+        if last is None:
+            return np.eye(4)
+        wheels = self._wheels
+        if wheels is not None and wheels.stamp_ns[0] <= last.stamp_ns and stamp_ns <= wheels.stamp_ns[-1]:
+            position_m, rotation = poses_at(wheels, np.array([last.stamp_ns, stamp_ns], dtype=np.int64))
+            motion = np.eye(4)
+            motion[:3, :3] = rotation[0].T @ rotation[1]
+            motion[:3, 3] = rotation[0].T @ (position_m[1] - position_m[0])
+        elif self._velocity is not None:
+            motion = expected_motion(self._velocity, (stamp_ns - last.stamp_ns) / NS_PER_S)
+        else:
+            motion = np.eye(4)
+        expected: Floats = last.match.T_odom_base @ motion
+        return expected
+
+    def _remember_velocity(self, placed: _Placed) -> None:
+        if self._last is None or placed.match.refusal:
+            return
+        motion = np.linalg.inv(self._last.match.T_odom_base) @ placed.match.T_odom_base
+        self._velocity = velocity_of(motion, (placed.stamp_ns - self._last.stamp_ns) / NS_PER_S)
+
+    def _odometry_event(self, numbered: NumberedSweep, match: Match) -> OdometryMatched | None:
+        last = self._last
+        if last is None:
+            return None
+        if match.refusal or last.match.refusal:
+            self.counts = replace(self.counts, unmatched=self.counts.unmatched + 1)
+            return None
+        motion, covariance = relative_pose(last.match, match, self._settings.odometry)
+        return OdometryMatched(
+            vehicle=self._vehicle,
+            boot_id=self._boot_id,
+            sensor=numbered.scanned.sensor,
+            from_sequence=last.sequence,
+            from_stamp_ns=last.stamp_ns,
+            sweep_sequence=numbered.sequence,
+            x_m=float(motion[0]),
+            y_m=float(motion[1]),
+            heading_rad=float(motion[2]),
+            covariance=covariance,
+            matched_share=match.matched_share,
+        )
+
+    def _told(self, waiting: _Waiting) -> tuple[tuple[int, Perceived], ...]:
+        counting = {track.number: track for track in self._tracks.tracks if track.confirmed}
+        landmarks = tuple(
+            _landmark(sight, counting[number])
+            for sight, number in zip(waiting.sights, waiting.tracks, strict=True)
+            if number in counting
+        )
+        perceived = LandmarksPerceived(
+            vehicle=self._vehicle,
+            boot_id=self._boot_id,
+            sensor=waiting.numbered.scanned.sensor,
+            sweep_sequence=waiting.numbered.sequence,
+            refusal=waiting.refusal,
+            landmarks=landmarks,
+        )
+        stamp_ns = waiting.numbered.stamp_ns
+        motion = () if waiting.odometry is None else ((stamp_ns, waiting.odometry),)
+        return (*motion, (stamp_ns, perceived))
+
+
+def _path_of(velocity: Floats, stamp_ns: int) -> Path:
+    """A velocity (6,) as a path about a stamp, in the base frame there."""
+    span_ns = round(VELOCITY_SPAN_S * NS_PER_S)
+    poses = np.array([expected_motion(velocity, share * VELOCITY_SPAN_S) for share in (-1.0, 0.0, 1.0)])
+    stamps = np.array([stamp_ns - span_ns, stamp_ns, stamp_ns + span_ns], dtype=np.int64)
+    return Path(stamp_ns=stamps, position_m=poses[:, :3, 3], rotation=Rotation.from_matrix(poses[:, :3, :3]))
+
+
+def _landmark(sight: Sight, track: Track) -> PerceivedLandmark:
+    return PerceivedLandmark(
+        kind=sight.kind,
+        landmark_class=class_of(track),
+        track=track.number,
+        x_m=float(sight.position_m[0]),
+        y_m=float(sight.position_m[1]),
+        variance_x_m2=float(sight.covariance_m2[0, 0]),
+        covariance_xy_m2=float(sight.covariance_m2[0, 1]),
+        variance_y_m2=float(sight.covariance_m2[1, 1]),
+        height_m=sight.height_m,
+        diameter_m=sight.diameter_m,
+        points=sight.points,
+    )

@@ -1,0 +1,130 @@
+"""Lidar odometry: each sweep matched to a map of those before it (VGICP, Koide et al. 2021, by small_gicp)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import small_gicp
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from trigpoint_perception.settings import OdometrySettings
+
+Floats = NDArray[np.float64]
+
+KEPT_SWEEPS = 100  # a voxel not hit for so long is forgotten
+CLEARED_EVERY = 10
+NEIGHBOURS = 10  # for a point's own covariance
+ROTATION_STEP_RAD = 1e-4
+ITERATIONS_MAX = 30
+PLANAR = np.ix_([3, 4, 2], [3, 4, 2])  # x, y, heading of a twist: rotation first, then translation
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Match:
+    """A sweep's place: `T_odom_base` (4, 4); its covariance (3, 3) of x, y and heading in its own base frame; the share
+    of its points with a partner; and why it is not to be relied on, if so (it then is where it was expected)."""
+
+    T_odom_base: Floats
+    covariance: Floats
+    matched_share: float
+    refusal: str
+
+
+class LidarOdometry:
+    """Sweeps matched one after the other, in a frame that begins at the first one. One thread, the same each time."""
+
+    def __init__(self, settings: OdometrySettings) -> None:
+        self._settings = settings
+        self._map = small_gicp.GaussianVoxelMap(settings.voxel_m)
+        self._map.set_lru(KEPT_SWEEPS, CLEARED_EVERY)
+        self._begun = False
+
+    def matched(self, point_m: Floats, expected: Floats) -> Match:
+        """The place of a deskewed sweep, points (n, 3) in the base frame, expected at `expected` (4, 4)."""
+        settings = self._settings
+        cloud, _ = small_gicp.preprocess_points(point_m, settings.downsampled_m, NEIGHBOURS, 1)
+        if not self._begun:
+            self._begun = True
+            self._map.insert(cloud, expected)
+            return Match(T_odom_base=expected, covariance=np.zeros((3, 3)), matched_share=1.0, refusal="")
+        found = small_gicp.align(
+            self._map,
+            cloud,
+            expected,
+            max_correspondence_distance=settings.reach_m,
+            num_threads=1,
+            max_iterations=ITERATIONS_MAX,
+            rotation_epsilon=ROTATION_STEP_RAD,
+        )
+        share = found.num_inliers / max(cloud.size(), 1)
+        covariance = _covariance(np.asarray(found.H), float(found.error), found.num_inliers, settings)
+        refusal = _refusal(found.converged, share, covariance, settings)
+        placed = expected if refusal else np.asarray(found.T_target_source)
+        self._map.insert(cloud, placed)
+        return Match(T_odom_base=placed, covariance=covariance, matched_share=share, refusal=refusal)
+
+
+def _refusal(converged: bool, share: float, covariance: Floats, settings: OdometrySettings) -> str:
+    if not converged:
+        return f"not converged after {ITERATIONS_MAX} iterations"
+    if share < settings.share_min:
+        return f"{share:.2f} of the points found a partner, at least {settings.share_min:g} have to"
+    loosest_m = float(np.sqrt(np.linalg.eigvalsh(covariance[:2, :2])[-1]))
+    if not loosest_m <= settings.sigma_max_m:
+        return f"1-sigma of {loosest_m:.2g} m along the loosest direction, over {settings.sigma_max_m:g} m"
+    return ""
+
+
+def _covariance(information: Floats, error: float, inliers: int, settings: OdometrySettings) -> Floats:
+    """The covariance (3, 3) of x, y, heading from the match's information (6, 6), rotation first.
+
+    Neighbouring points see the same surface, so that as many points tell less than they would alone: the covariance is
+    wider by `inflation`, and by the residuals where they are larger than the points' own covariances say.
+    """
+    values, vectors = np.linalg.eigh(information)
+    values = np.maximum(values, 1e-6 * values[-1])  # a direction nothing fixes is loose, not infinite
+    full = (vectors / values) @ vectors.T
+    scale = max(1.0, 2.0 * error / max(3 * inliers, 1)) * settings.inflation
+    planar: Floats = full[PLANAR] * scale
+    return planar
+
+
+def relative_pose(before: Match, after: Match, settings: OdometrySettings) -> tuple[Floats, Floats]:
+    """The base's motion (3,), x, y in m and heading in rad, between two matches, and its covariance (3, 3).
+
+    Both places are uncertain against the map; what the map's own drift and the level frame leave out is a floor and a
+    share of the distance.
+    """
+    relative = np.linalg.inv(before.T_odom_base) @ after.T_odom_base
+    heading_rad = float(np.arctan2(relative[1, 0], relative[0, 0]))
+    motion = np.array([relative[0, 3], relative[1, 3], heading_rad])
+    turned = np.eye(3)
+    turned[:2, :2] = [[np.cos(heading_rad), -np.sin(heading_rad)], [np.sin(heading_rad), np.cos(heading_rad)]]
+    run_m = float(np.hypot(motion[0], motion[1]))
+    across_m = settings.floor_sigma_m + settings.share_of_distance * run_m
+    floor = np.diag([across_m**2, across_m**2, settings.floor_sigma_rad**2])
+    carried = _carried(motion) @ before.covariance @ _carried(motion).T
+    return motion, turned @ after.covariance @ turned.T + carried + floor
+
+
+def _carried(motion: Floats) -> Floats:
+    """How an error of the earlier pose moves the later one as seen from it (3, 3)."""
+    return np.array([[1.0, 0.0, -motion[1]], [0.0, 1.0, motion[0]], [0.0, 0.0, 1.0]])
+
+
+def expected_motion(velocity: Floats, dt_s: float) -> Floats:
+    """The motion (4, 4) of a velocity (6,), rotation vector in rad/s first, then m/s, held for so long."""
+    motion = np.eye(4)
+    motion[:3, :3] = Rotation.from_rotvec(velocity[:3] * dt_s).as_matrix()
+    motion[:3, 3] = velocity[3:] * dt_s
+    return motion
+
+
+def velocity_of(motion: Floats, dt_s: float) -> Floats:
+    """The velocity (6,) whose motion over `dt_s` this is."""
+    return np.concatenate([Rotation.from_matrix(motion[:3, :3]).as_rotvec(), motion[:3, 3]]) / dt_s
+
+
+def planar_pose(T_odom_base: Floats) -> Floats:
+    """x, y in m and heading in rad (3,) of a pose (4, 4)."""
+    return np.array([T_odom_base[0, 3], T_odom_base[1, 3], np.arctan2(T_odom_base[1, 0], T_odom_base[0, 0])])
