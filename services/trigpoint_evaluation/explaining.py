@@ -13,10 +13,13 @@ from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.mapped import AnchorAssociated, ImageOffsetSolved, Mapped, MapSolved, TrajectorySolved
 from trigpoint.events.names import nearest_names
 from trigpoint.events.observed import LandmarksDetected, VehicleDescribed
+from trigpoint.events.perceived import LandmarksPerceived
+from trigpoint.events.perceived_detections import detected_in
 from trigpoint.landmarks.model import Landmark, MapVersion, valid_at
 from trigpoint.landmarks.ports import LandmarkStore
 from trigpoint.landmarks.queries import Disc, LandmarkQuery, require_known_version
 from trigpoint.logs.ports import EventLog, LoggedBoot, LoggedEvent
+from trigpoint.logs.readings import PERCEIVED_STREAM
 from trigpoint_evaluation.core.explanation import (
     AnchorName,
     DriveName,
@@ -169,11 +172,29 @@ def _seen(log: EventLog, row: Landmark, drive: DriveName, sweeps: Sequence[int],
     described = _described(log, stream, boot)
     from_ns, until_ns = max(row.first_seen_ns, boot.start_ns), min(row.last_seen_ns, boot.end_ns) + 1
     wanted = set(sweeps)
-    return [
-        _sighting(logged, row, parts.paths.get(drive), described)
+    detected = (
+        _Swept(logged, logged.envelope.identity.sequence, cast(LandmarksDetected, logged.envelope.event))
         for logged in log.read(stream, from_ns=from_ns, until_ns=until_ns, kinds=(LandmarksDetected,))
-        if logged.envelope.identity.boot_id == boot_id and logged.envelope.identity.sequence in wanted
+        if logged.envelope.identity.boot_id == boot_id
+    )
+    perceived = (
+        _Swept(logged, event.sweep_sequence, detected_in(event, described))
+        for logged in log.read(PERCEIVED_STREAM, from_ns=from_ns, until_ns=until_ns, kinds=(LandmarksPerceived,))
+        if ((event := cast(LandmarksPerceived, logged.envelope.event)).vehicle, event.boot_id) == drive
+    )
+    path = parts.paths.get(drive)
+    return [
+        _sighting(swept, row, path, drive, described) for swept in (*detected, *perceived) if swept.sequence in wanted
     ]
+
+
+@dataclass(frozen=True, slots=True)
+class _Swept:
+    """What was detected in a sweep, and the event that says so."""
+
+    logged: LoggedEvent
+    sequence: int
+    detected: LandmarksDetected
 
 
 def _described(log: EventLog, stream: str, boot: LoggedBoot) -> VehicleDescribed:
@@ -186,17 +207,16 @@ def _described(log: EventLog, stream: str, boot: LoggedBoot) -> VehicleDescribed
 
 
 def _sighting(
-    logged: LoggedEvent, row: Landmark, path: TrajectorySolved | None, described: VehicleDescribed
+    swept: _Swept, row: Landmark, path: TrajectorySolved | None, drive: DriveName, described: VehicleDescribed
 ) -> Sighting:
-    identity, stamp_ns = logged.envelope.identity, logged.envelope.stamp_ns
-    sweep = cast(LandmarksDetected, logged.envelope.event)
-    seen, off_m = detection_of(row, sweep.detections, sensor_pose(path, described, stamp_ns))
+    stamp_ns = swept.logged.envelope.stamp_ns
+    seen, off_m = detection_of(row, swept.detected.detections, sensor_pose(path, described, stamp_ns))
     return Sighting(
-        vehicle=identity.source,
-        boot_id=identity.boot_id,
-        sequence=identity.sequence,
+        vehicle=drive[0],
+        boot_id=drive[1],
+        sequence=swept.sequence,
         stamp_ns=stamp_ns,
-        position=logged.position,
+        position=swept.logged.position,
         range_m=None if seen is None else seen.range_m,
         bearing_rad=None if seen is None else seen.bearing_rad,
         off_m=off_m,

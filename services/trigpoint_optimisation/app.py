@@ -14,6 +14,7 @@ from trigpoint.logs.ports import EventLog
 from trigpoint.logs.readings import (
     FRAME_STREAM,
     LABEL_STREAM,
+    PERCEIVED_STREAM,
     VERDICT_STREAM,
     logged_anchors,
     logged_drives,
@@ -35,6 +36,8 @@ STREAM = STREAM_PATTERNS[MapSolved]
 def input_positions(log: EventLog) -> tuple[tuple[str, int], ...]:
     """How many events of each stream a solve of the log as it stands is made from."""
     streams = (*vehicle_streams(log), FRAME_STREAM, LABEL_STREAM, VERDICT_STREAM)
+    if log.next_number(PERCEIVED_STREAM):
+        streams = (*streams, PERCEIVED_STREAM)
     return tuple((stream, log.next_number(stream)) for stream in streams)
 
 

@@ -28,7 +28,14 @@ from trigpoint.events.observed import Observed
 from trigpoint.geodesy.projection import MapFrame
 from trigpoint.logs.following import StreamFollower
 from trigpoint.logs.ports import EventLog
-from trigpoint.logs.readings import LABEL_STREAM, VEHICLE_PREFIX, VERDICT_STREAM, logged_corrections, pinned_frame
+from trigpoint.logs.readings import (
+    LABEL_STREAM,
+    PERCEIVED_STREAM,
+    VEHICLE_PREFIX,
+    VERDICT_STREAM,
+    logged_corrections,
+    pinned_frame,
+)
 from trigpoint.observability.backlog import Backlog
 from trigpoint.observability.metrics import Instruments
 from trigpoint_optimisation.app import SOURCE, STREAM, boot_id_of, envelopes, input_positions
@@ -226,8 +233,9 @@ class LiveOptimisation:
         return bool(changed)
 
     def _positions(self) -> tuple[tuple[str, int], ...]:
-        """How far each stream is taken in, by the version before or since."""
-        at = {**self._measured.checkpoint, **self._judged.checkpoint, **self._corrected.checkpoint}
+        """How far each stream is taken in, by the version before or since; what perception finds waits for the next
+        whole solve."""
+        at = {PERCEIVED_STREAM: 0, **self._measured.checkpoint, **self._judged.checkpoint, **self._corrected.checkpoint}
         return tuple(
             (stream, max(at.get(stream, number), self._version_inputs.get(stream, 0)))
             for stream, number in input_positions(self._log)

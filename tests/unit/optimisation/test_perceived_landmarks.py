@@ -1,0 +1,138 @@
+"""What perception found in points is solved as what a landmark sensor detected."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solved_worlds.examples import Lap, World, world
+from solved_worlds.logged import append_world
+from trigpoint.events.codec import Event
+from trigpoint.events.envelope import Envelope, EventIdentity
+from trigpoint.events.mapped import LandmarkSolved
+from trigpoint.events.observed import LandmarkDetection, LandmarksDetected, VehicleDescribed
+from trigpoint.events.perceived import LandmarksPerceived, PerceivedLandmark
+from trigpoint.events.perceived_detections import detected_in
+from trigpoint.landmarks.memory_store import MemoryStore
+from trigpoint.logs.memory_log import MemoryLog
+from trigpoint.logs.readings import PERCEIVED_STREAM, logged_drives, logged_maps
+from trigpoint_evaluation.explaining import explained
+from trigpoint_landmarks.app import project
+from trigpoint_optimisation.app import build, input_positions
+from trigpoint_optimisation.settings import OdometrySettings, SolveSettings
+
+SETTINGS = SolveSettings(method="anchored", odometry=OdometrySettings(keyframe_m=4.0))  # coarse: quick
+SAME_M = 1e-6  # there and back through the base frame
+
+
+@pytest.fixture(scope="module")
+def block() -> World:
+    return world(Lap(duration_s=75.0), Lap(vehicle="van", begin_rad=3.5, seed=2, duration_s=50.0))
+
+
+@pytest.fixture(scope="module")
+def detected(block: World) -> MemoryLog:
+    log = MemoryLog()
+    append_world(log, block)
+    return log
+
+
+@pytest.fixture(scope="module")
+def perceived(detected: MemoryLog) -> MemoryLog:
+    """The same drives, without a detection of theirs, and perception's word of each in its place."""
+    log, found = MemoryLog(), list[Envelope[Event]]()
+    for stream in detected.streams():
+        rows = [row.envelope for row in detected.read(stream)]
+        described = next((row.event for row in rows if isinstance(row.event, VehicleDescribed)), None)
+        if described is not None:
+            found += [by_perception(row, described, len(found) + n) for n, row in enumerate(sweeps_of(rows))]
+        log.append(stream, [row for row in rows if not isinstance(row.event, LandmarksDetected)])
+    log.append(PERCEIVED_STREAM, found)
+    return log
+
+
+def sweeps_of(rows: list[Envelope[Event]]) -> list[Envelope[Event]]:
+    return [row for row in rows if isinstance(row.event, LandmarksDetected)]
+
+
+def by_perception(row: Envelope[Event], described: VehicleDescribed, sequence: int) -> Envelope[Event]:
+    assert isinstance(row.event, LandmarksDetected)
+    event = LandmarksPerceived(
+        vehicle=row.identity.source,
+        boot_id=row.identity.boot_id,
+        sensor="roof",
+        sweep_sequence=row.identity.sequence,
+        refusal="",
+        landmarks=tuple(in_base(seen, described) for seen in row.event.detections),
+    )
+    return Envelope(EventIdentity("perception", "boot-1", sequence), row.stamp_ns, event)
+
+
+def in_base(seen: LandmarkDetection, described: VehicleDescribed) -> PerceivedLandmark:
+    angle_rad = seen.bearing_rad + described.landmark_sensor_yaw_rad
+    return PerceivedLandmark(
+        kind=seen.kind,
+        landmark_class=seen.kind,
+        track=0,
+        x_m=described.landmark_sensor_x_m + seen.range_m * math.cos(angle_rad),
+        y_m=described.landmark_sensor_y_m + seen.range_m * math.sin(angle_rad),
+        variance_x_m2=0.01,
+        covariance_xy_m2=0.0,
+        variance_y_m2=0.01,
+        height_m=4.0,
+        diameter_m=seen.diameter_m,
+        points=20,
+    )
+
+
+def placed(log: MemoryLog) -> list[LandmarkSolved]:
+    build(log, SETTINGS)
+    return sorted(logged_maps(log)[-1].landmarks, key=lambda one: one.observations)
+
+
+def test_a_map_from_points_is_the_map_from_the_same_detections(detected: MemoryLog, perceived: MemoryLog) -> None:
+    ours, theirs = placed(perceived), placed(detected)
+    assert [one.observations for one in ours] == [one.observations for one in theirs]
+    assert np.abs(np.array([one.position_m for one in ours]) - [one.position_m for one in theirs]).max() < SAME_M
+
+
+def test_a_map_says_how_far_it_took_perception_in(detected: MemoryLog, perceived: MemoryLog) -> None:
+    assert dict(input_positions(perceived))[PERCEIVED_STREAM] == perceived.next_number(PERCEIVED_STREAM)
+    assert PERCEIVED_STREAM not in dict(input_positions(detected))
+
+
+def test_behind_a_landmark_stands_what_perception_said(perceived: MemoryLog) -> None:
+    store, landmark = MemoryStore(), placed(perceived)[0]
+    project(perceived, store)
+    found = explained(perceived, store, landmark.landmark)
+    seen = {(one.vehicle, one.boot_id, one.sequence) for one in found.sightings}
+    assert (seen, found.missing) == (set(landmark.observations), 0)
+    assert {one.position.stream for one in found.sightings} == {PERCEIVED_STREAM}
+    assert max(one.off_m for one in found.sightings if one.off_m is not None) < 1.0
+
+
+def test_what_was_found_in_an_unknown_drive_or_in_an_unusable_sweep_makes_no_detection(perceived: MemoryLog) -> None:
+    (row, *_) = (logged.envelope for logged in perceived.read(PERCEIVED_STREAM))
+    assert isinstance(row.event, LandmarksPerceived)
+    log = MemoryLog()
+    for stream in perceived.streams():
+        if stream != PERCEIVED_STREAM:
+            log.append(stream, [logged.envelope for logged in perceived.read(stream)])
+    strange = replace(row.event, vehicle="nobody"), replace(row.event, landmarks=(), refusal="no point")
+    log.append(PERCEIVED_STREAM, [replace(row, event=event) for event in strange])
+    assert [len(drive.detections.range_m) for drive in logged_drives(log)] == [0, 0]
+
+
+def test_range_and_bearing_are_from_the_landmark_sensor() -> None:
+    described = VehicleDescribed(
+        vehicle="car", landmark_sensor_x_m=2.0, landmark_sensor_y_m=1.0, landmark_sensor_yaw_rad=math.pi / 2
+    )
+    ahead = in_base(LandmarkDetection(5.0, -math.pi / 2, "pole", "", 0.2), described)
+    assert (ahead.x_m, ahead.y_m) == pytest.approx((7.0, 1.0))
+    event = LandmarksPerceived(
+        vehicle="car", boot_id="b", sensor="roof", sweep_sequence=0, refusal="", landmarks=(ahead,)
+    )
+    (seen,) = detected_in(event, described).detections
+    assert [seen.range_m, seen.bearing_rad] == pytest.approx([5.0, -math.pi / 2])
+    assert (seen.kind, seen.diameter_m) == ("pole", 0.2)
