@@ -59,10 +59,9 @@ def walls_of(ordered: OrderedSweep, sensor_m: Floats, settings: WallSettings) ->
 def _upright(ordered: OrderedSweep, sensor_m: Floats, settings: WallSettings) -> Bools:
     """Which points (n,) stand in a cell that is filled from low to high."""
     side = int(2.0 * settings.range_max_m / settings.cell_m) + 1
-    cell = np.floor((ordered.point_m[:, :2] - sensor_m[:2] + settings.range_max_m) / settings.cell_m).astype(np.int64)
-    inside = (ordered.height_m > FROM_M) & (cell >= 0).all(axis=1) & (cell < side).all(axis=1)
-    number = np.where(inside, cell[:, 0] * side + cell[:, 1], -1)
-    return _filled(number, ordered.height_m, side * side, settings.top_min_m, settings.extent_min_m)
+    corner_m = sensor_m[:2] - settings.range_max_m
+    cell = _cells(ordered.point_m, ordered.height_m, corner_m, settings.cell_m, side)
+    return _filled(cell, ordered.height_m, side * side, settings.top_min_m, settings.extent_min_m)
 
 
 def _kept(sums: Floats, extent: Floats, settings: WallSettings) -> Walls:
@@ -89,6 +88,17 @@ def _fitted(sums: Floats) -> tuple[Floats, Floats, Floats]:
     """Middles (m, 2), directions (m, 2) and root mean square distances (m,) from the lines of sums (m, 9)."""
     line = np.array([_line(row) for row in sums]).reshape(-1, 5)
     return line[:, 0:2], line[:, 2:4], line[:, 4]
+
+
+@compiled
+def _cells(point_m: Floats, height_m: Floats, corner_m: Floats, cell_m: float, side: int) -> Ints:
+    """The cell (n,) of each point in a square grid, -1 for what is near the ground or outside."""
+    cell = np.full(len(point_m), -1, np.int64)
+    for row in range(len(point_m)):
+        column, line = (point_m[row, 0] - corner_m[0]) / cell_m, (point_m[row, 1] - corner_m[1]) / cell_m
+        if height_m[row] > FROM_M and 0.0 <= column < side and 0.0 <= line < side:
+            cell[row] = int(column) * side + int(line)
+    return cell
 
 
 @compiled
