@@ -41,7 +41,8 @@ from trigpoint_optimisation.whole_solve import WholeSolve, WholeSolver
 BATCH = 1000  # events taken at a time
 IDLE_S = 0.02  # between two looks at a log without news
 SOLVING = 2  # times its limit the graph may grow while the whole map is being solved, which may take long
-TOGETHER = 64  # events of a version appended at a time
+TOGETHER = 64  # events of a version appended at a time, fewer where they have more than
+TOGETHER_PARTS = 4_000  # observations and poses: what they are while they are written is hundreds of bytes each
 METHOD = "incremental"
 ODOMETRY_STREAM = STREAM_PATTERNS[OdometryCorrected]
 CORRECTIONS = (AnchorLabelled, AnchorRetracted, DriveExcluded, DriveIncluded)
@@ -237,7 +238,7 @@ class LiveOptimisation:
         version, sequence = self._version + 1, 0
         boot_id = boot_id_of(version, head.inputs, self._settings)
         events = chain(parts, (head,))
-        while some := [replace(event, map_version=version) for event in islice(events, TOGETHER)]:
+        while some := [replace(event, map_version=version) for event in _some(events)]:
             self._say(STREAM, envelopes(some, boot_id=boot_id, stamp_ns=stamp_ns, first_sequence=sequence))
             sequence += len(some)
         self._version, self._version_inputs = version, dict(head.inputs)
@@ -323,6 +324,17 @@ def _noted(parts: Iterable[Mapped], base: list[Mapped]) -> Iterator[Mapped]:
     for part in parts:
         base.append(needed_of(part))
         yield part
+
+
+def _some(events: Iterator[Mapped]) -> Iterator[Mapped]:
+    """The next events, few enough to be written at a time."""
+    parts = 0
+    for event in islice(events, TOGETHER):
+        yield event
+        parts += len(event.observations) if isinstance(event, LandmarkSolved) else 0
+        parts += len(event.stamp_ns) if isinstance(event, TrajectorySolved) else 0
+        if parts > TOGETHER_PARTS:
+            return
 
 
 def _is_vehicle(stream: str) -> bool:

@@ -123,9 +123,7 @@ class SolverProcess:
         self._solving = self._answers = None
         said = _said(solving, answers)
         found: WholeSolve = next(said)
-        if found.head is None:
-            said.close()
-        return replace(found, parts=said)
+        return replace(found, parts=said) if found.head is not None else replace(found, parts=tuple(said))
 
     def close(self) -> None:
         """The process under way, if any, ended."""

@@ -1,16 +1,15 @@
-"""Independent pieces of work done side by side, in threads of this process or on a cluster: Dask's one home."""
+"""Independent pieces of work done side by side, in threads of this process or by Dask workers elsewhere: Dask's one
+home."""
 
 import os
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from trigpoint.errors import InputError, ServiceError
-
-if TYPE_CHECKING:
-    from distributed import Client, Future
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -26,91 +25,74 @@ class Done(Generic[Item, Result]):
 
     item: Item
     result: Result | None
-    error: Exception | None = None
+    error: BaseException | None = None
 
 
 class Workers:
-    """Does pieces of work; made by `workers`."""
+    """Does pieces of work; made by `workers`. `threads`: how many are at work at once."""
 
-    def __init__(self, client: "Client") -> None:
-        self._client = client
-
-    @property
-    def threads(self) -> int:
-        """How many pieces are at work at once, as far as workers are there now; at least 1."""
-        return max(1, sum(self._client.nthreads().values()))
+    def __init__(self, executor: Executor, threads: int) -> None:
+        self._executor, self.threads = executor, threads
 
     def each(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Done[Item, Result]]:
-        """Every item worked on once, in the order they end in; items are drawn only as threads come free.
+        """Every item worked on, in the order they end in; items are drawn only as threads come free.
 
-        An error ends its own piece only. A piece whose worker died is done again by another; one that ended several
-        workers is given up, with distributed.KilledWorker. `work` and items must be picklable for a cluster, and work
-        done twice must do no harm. Whoever leaves early leaves nothing under way.
+        An error ends its own piece only. A piece whose worker died is done again by another one; where it ends several
+        workers it is given up, with distributed.KilledWorker for error. For workers elsewhere `work`, items and
+        results are pickled, and work done twice must do no harm. Who leaves early leaves nothing waiting behind.
         """
-        from distributed import as_completed
-
         waiting = iter(items)
-        under_way: dict[Future, Item] = {}
-        finished = as_completed(loop=self._client.loop)
+        under_way: dict[Future[Result], Item] = {}
         try:
-            self._hand_out(work, waiting, under_way, finished)
-            for future in finished:
-                item = under_way.pop(future)
-                error = future.exception() if future.status == "error" else None
-                yield Done(item, future.result() if error is None else None, error)
-                self._hand_out(work, waiting, under_way, finished)
+            while self._hand_out(work, waiting, under_way):
+                for future in wait(under_way, return_when=FIRST_COMPLETED).done:
+                    item, error = under_way.pop(future), future.exception()
+                    yield Done(item, future.result() if error is None else None, error)
         finally:
-            self._client.cancel(list(under_way), force=True)
+            for future in under_way:
+                future.cancel()
 
     def _hand_out(
-        self,
-        work: Callable[[Item], Result],
-        waiting: Iterator[Item],
-        under_way: "dict[Future, Item]",
-        finished: "as_completed",  # noqa: F821  # imported where it is used: it takes half a second
-    ) -> None:
-        room = AHEAD * self.threads - len(under_way)
-        for item in islice(waiting, max(room, 0)):
-            future = self._client.submit(work, item, pure=False)
-            under_way[future] = item
-            finished.add(future)
+        self, work: Callable[[Item], Result], waiting: Iterator[Item], under_way: dict[Future[Result], Item]
+    ) -> bool:
+        """Whether anything is under way."""
+        for item in islice(waiting, AHEAD * self.threads - len(under_way)):
+            under_way[self._executor.submit(work, item)] = item
+        return bool(under_way)
 
 
 @contextmanager
 def workers(cluster: str = "", *, threads: int = 0) -> Iterator[Workers]:
-    """Threads of this process (0: one a core), or the workers of a Dask scheduler at an address such as
-    tcp://10.0.0.1:8786.
+    """Threads of this process (0: one a core), or the workers of the Dask scheduler at an address such as
+    tcp://10.0.0.1:8786, as many as there are now.
 
-    Raises InputError for an address or a number of threads that cannot be, ServiceError where no scheduler answers.
+    Raises InputError for an address or a number of threads that cannot be, ServiceError where no scheduler answers or
+    it has no workers.
     """
-    from distributed import Client, LocalCluster
-
     if threads < 0:
         raise InputError(f"threads {threads}: 0 (one a core) or more")
-    if cluster and not cluster.startswith(SCHEMES):
-        raise InputError(f"cluster {cluster!r}: an address of a Dask scheduler, such as tcp://10.0.0.1:8786")
     if cluster:
-        with _reached(cluster) as client:
-            yield Workers(client)
+        with _elsewhere(cluster) as found:
+            yield found
         return
-    with (
-        LocalCluster(
-            n_workers=1,
-            threads_per_worker=threads or os.cpu_count() or 1,
-            processes=False,
-            dashboard_address=None,
-            memory_limit=0,
-            silence_logs=False,
-        ) as local,
-        Client(local) as client,
-    ):
-        yield Workers(client)
+    count = threads or os.cpu_count() or 1
+    with ThreadPoolExecutor(count, thread_name_prefix="worker") as executor:
+        yield Workers(executor, count)
 
 
-def _reached(cluster: str) -> "Client":
-    from distributed import Client
+@contextmanager
+def _elsewhere(cluster: str) -> Iterator[Workers]:
+    import distributed  # here: it takes a second, and threads do without it
 
+    if not cluster.startswith(SCHEMES):
+        raise InputError(f"cluster {cluster!r}: the address of a Dask scheduler, such as tcp://10.0.0.1:8786")
     try:
-        return Client(cluster, timeout=REACHED_WITHIN_S)
+        client: Any = distributed.Client(cluster, timeout=REACHED_WITHIN_S)  # type: ignore[no-untyped-call]
     except OSError as error:
-        raise ServiceError(f"no Dask scheduler at {cluster} within {REACHED_WITHIN_S:g} s: {error}") from error
+        raise ServiceError(f"no Dask scheduler answers at {cluster} within {REACHED_WITHIN_S:g} s: {error}") from error
+    with client:
+        threads = sum(client.nthreads().values())
+        if not threads:
+            raise ServiceError(f"the Dask scheduler at {cluster} has no workers")
+        with client.get_executor(pure=False) as executor:
+            yield Workers(executor, threads)

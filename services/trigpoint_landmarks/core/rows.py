@@ -29,7 +29,7 @@ from trigpoint.landmarks.model import (
 from trigpoint_landmarks.core.versions import SolvedVersion
 
 Floats = NDArray[np.float64]
-UNSEEN = provenance_json(())
+UNSEEN = provenance_json({})
 HELD_LENGTH = 128  # characters of provenance that are kept as they are
 Labels = Mapping[tuple[str, str], AnchorLabelled]  # by name and image
 

@@ -107,7 +107,7 @@ class SweepFollower:
         return told
 
     def _seen(self, numbered: NumberedSweep) -> _Waiting:
-        """One sweep searched, matched and tracked. Raises EventRejected where it is not usable; nothing changed then."""
+        """One sweep searched, matched and tracked. Raises EventRejected where it is not usable."""
         sweep = self._still(usable_sweep(numbered.scanned, self._settings.sweep), numbered.stamp_ns)
         sights = sights_of(sweep, self._settings)
         match = self._odometry.matched(sweep.point_m, self._expected(numbered.stamp_ns))

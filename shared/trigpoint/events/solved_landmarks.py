@@ -1,6 +1,7 @@
 """LandmarkSolved events column by column, as many as came together: decoded side by side instead of one by one."""
 
-from collections.abc import Callable, Sequence
+from array import array
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -17,12 +18,15 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 MeaningT = TypeVar("MeaningT")
 Names = tuple[str, ...]
-Observations = tuple[tuple[str, str, int], ...]
+Observations = Mapping[tuple[str, str], Sequence[int]]
+"""Of each drive (vehicle, boot_id) the sequences of the sweeps that saw a landmark; thousands take little room so."""
 
 NAMES_BYTES = 4 * 1024 * 1024  # of names kept: they come again with every version
 KNOWN_BYTES = 256 * 1024  # of other texts whose meaning is kept; what is kept takes some ten times that
+KNOWN_LENGTH = 512  # bytes of such a text; longer ones hardly come again
 SCHEMA = schema_name(LandmarkSolved)
 FIELD = mapped_pb2.LandmarkSolved.DESCRIPTOR.fields_by_name
+UNSEEN: Observations = {}
 VARINT, FIXED64, LENGTH = 0, 1, 2  # wire types (protobuf.dev, Encoding)
 
 
@@ -83,8 +87,19 @@ def in_columns(events: Sequence[LandmarkSolved]) -> SolvedLandmarks:
         first_seen_ns=np.array([row.first_seen_ns for row in events], dtype=np.int64),
         last_seen_ns=np.array([row.last_seen_ns for row in events], dtype=np.int64),
         anchors=[row.anchors for row in events],
-        observations=[row.observations for row in events],
+        observations=[by_drive(row.observations) for row in events],
     )
+
+
+def by_drive(observations: Iterable[tuple[str, str, int]]) -> Observations:
+    """Observations (vehicle, boot_id, sequence) grouped by drive, in order of the drives' first ones."""
+    grouped: dict[tuple[str, str], array[int]] = {}
+    for vehicle, boot_id, sequence in observations:
+        sequences = grouped.get((vehicle, boot_id))
+        if sequences is None:
+            sequences = grouped[vehicle, boot_id] = array("q")
+        sequences.append(sequence)
+    return grouped
 
 
 class LandmarkDecoder:
@@ -119,7 +134,7 @@ class LandmarkDecoder:
             first_seen_ns=first_seen_ns,
             last_seen_ns=last_seen_ns,
             anchors=[one[0] if one else () for one in seen],
-            observations=[one[1] if one else () for one in seen],
+            observations=[one[1] if one else UNSEEN for one in seen],
         )
         for texts in (names, vehicles, seen):
             if None in texts:
@@ -171,7 +186,7 @@ class _Known(Generic[MeaningT]):
 
     def _learnt(self, part: bytes) -> MeaningT | None:
         found = self._known.get(part) or self._meaning(part)
-        if found is not None and part not in self._known:
+        if found is not None and len(part) <= KNOWN_LENGTH and part not in self._known:
             if self._bytes > self._limit_bytes:
                 self._known, self._bytes = {}, 0
             self._known[part] = found
@@ -198,8 +213,8 @@ def _seen_of(part: bytes) -> tuple[Names, Observations] | None:
     message = _message(part)
     if message is None or any(field.name not in ("anchors", "observations") for field, _ in message.ListFields()):
         return None
-    sweeps = tuple([(sweep.vehicle, sweep.boot_id, sweep.sequence) for sweep in message.observations])
-    return tuple(message.anchors), sweeps
+    sweeps = ((sweep.vehicle, sweep.boot_id, sweep.sequence) for sweep in message.observations)
+    return tuple(message.anchors), by_drive(sweeps)
 
 
 def _message(part: bytes) -> mapped_pb2.LandmarkSolved | None:

@@ -1,7 +1,7 @@
 """The landmark map as values: what a map version holds, and what changes from one version to the next."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -207,13 +207,10 @@ class LandmarkChanges:
     removed: tuple[str, ...]
 
 
-def provenance_json(observations: Sequence[tuple[str, str, int]]) -> str:
-    """The text a landmark keeps of its observations: (vehicle, boot, sequence of the sweep) each."""
-    by_drive: dict[tuple[str, str], list[int]] = {}
-    for vehicle, boot_id, sequence in observations:
-        by_drive.setdefault((vehicle, boot_id), []).append(sequence)
+def provenance_json(observations: Mapping[tuple[str, str], Sequence[int]]) -> str:
+    """The text a landmark keeps of its observations: of each drive (vehicle, boot) the sequences of the sweeps."""
     # A list of whole numbers reads the same in JSON as in Python; there are too many of these for an encoder.
-    return "{" + ", ".join(f"{_drive_json(drive)}: {sequences}" for drive, sequences in by_drive.items()) + "}"
+    return "{" + ", ".join(f"{_drive_json(drive)}: {list(sweeps)}" for drive, sweeps in observations.items()) + "}"
 
 
 @lru_cache(maxsize=4096)

@@ -25,7 +25,7 @@ from landmark_maps.examples import (
 from trigpoint.events.corrected import AnchorRetracted, Corrected
 from trigpoint.events.envelope import LogPosition
 from trigpoint.events.mapped import LandmarkSolved, Mapped
-from trigpoint.events.solved_landmarks import in_columns
+from trigpoint.events.solved_landmarks import by_drive, in_columns
 from trigpoint.landmarks.model import Landmark, MapChange, provenance_json
 from trigpoint_landmarks.core.rows import HELD_LENGTH, labels_within, landmark_rows, make_valid, map_change
 from trigpoint_landmarks.core.versions import solved_versions
@@ -219,7 +219,8 @@ def test_what_a_label_would_tell_is_kept_of_landmarks_whose_terms_are_numbers() 
 
 places_m = st.floats(-20_000.0, 20_000.0)
 variances_m2 = st.floats(1e-6, 100.0)
-any_observations = st.lists(st.tuples(st.text(max_size=3), st.just("boot-1"), st.integers()), max_size=3).map(tuple)
+any_sequence = st.integers(-(2**63), 2**63 - 1)  # what the wire can carry
+any_observations = st.lists(st.tuples(st.text(max_size=3), st.just("boot-1"), any_sequence), max_size=3).map(tuple)
 
 
 @st.composite
@@ -240,4 +241,4 @@ def any_landmark(draw: st.DrawFn) -> LandmarkSolved:
 def test_rows_made_side_by_side_are_those_made_one_by_one(events: list[LandmarkSolved]) -> None:
     one_by_one = [row for event in events for row in landmark_rows(in_columns([event]), frame())]
     assert landmark_rows(in_columns(events), frame()) == one_by_one
-    assert [row.provenance for row in one_by_one] == [provenance_json(event.observations) for event in events]
+    assert [row.provenance for row in one_by_one] == [provenance_json(by_drive(event.observations)) for event in events]

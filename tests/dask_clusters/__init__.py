@@ -1,0 +1,1 @@
+"""Pieces of work for the processes of a Dask cluster."""
