@@ -7,6 +7,7 @@ import click
 from trigpoint_cli.output import Answer, Screen, answering
 from trigpoint_vehicle import app as vehicle
 from trigpoint_vehicle.app import Written
+from trigpoint_vehicle.cloud_conversion import WrittenClouds
 
 SOURCE = click.Path(exists=False, path_type=Path)
 
@@ -43,6 +44,31 @@ def victoria_park(source: Path, out_dir: Path, *, screen: Screen) -> Answer:
 def mrclam(source: Path, out_dir: Path, *, screen: Screen) -> Answer:
     """A UTIAS multi-robot set (RobotN_*.dat, Barcodes.dat) in folder SOURCE."""
     return _answer(vehicle.convert_mrclam(source, out_dir))
+
+
+def _cloud_answer(written: WrittenClouds) -> Answer:
+    aside = written.left_aside
+    values = {
+        "logs": [str(written.log)],
+        "vehicles": {written.log.stem: {"log": str(written.log), "size_bytes": written.log.stat().st_size}},
+        "events": written.counts,
+        "left_aside": dict(aside.counts),
+    }
+    counts = ", ".join(f"{count} {name}" for name, count in sorted(written.counts.items()))
+    return Answer(values, (f"wrote {written.log}: {counts}",), aside.complaints())
+
+
+@command.command("kitti")
+@click.argument("source", type=SOURCE)
+@click.argument("out_dir", type=SOURCE)
+@answering
+def kitti(source: Path, out_dir: Path, *, screen: Screen) -> Answer:
+    """A KITTI raw drive in folder SOURCE (velodyne_points, oxts), its calibration in it or beside it.
+
+    A scan that cannot be read or has no stamp is counted and left aside, and ends the command with status 2 after
+    everything else was written.
+    """
+    return _cloud_answer(vehicle.convert_kitti(source, out_dir))
 
 
 @command.command("table")

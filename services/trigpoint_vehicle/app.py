@@ -10,6 +10,7 @@ from trigpoint.errors import InputError
 from trigpoint.events.truth import truth_lines
 from trigpoint.logs.vehicle_log import write_vehicle_log
 from trigpoint_vehicle.aerial_files import PictureFolder, write_pictures
+from trigpoint_vehicle.cloud_conversion import WrittenClouds, write_cloud_drive
 from trigpoint_vehicle.core.aerial import aerial_pictures
 from trigpoint_vehicle.core.anchors_geojson import anchors_geojson
 from trigpoint_vehicle.core.campus import conversion_of, simulate_campus
@@ -17,9 +18,10 @@ from trigpoint_vehicle.core.mrclam import BARCODES, LANDMARKS, RobotSources, mrc
 from trigpoint_vehicle.core.recording import Conversion
 from trigpoint_vehicle.core.table_manifest import parsed_manifest
 from trigpoint_vehicle.core.table_rows import converted_tables
-from trigpoint_vehicle.core.text_tables import SourceText
 from trigpoint_vehicle.core.victoria_park import GPS, INPUTS, MEASUREMENTS, victoria_park
+from trigpoint_vehicle.kitti_files import kitti_drive
 from trigpoint_vehicle.settings import SimulationSettings
+from trigpoint_vehicle.source_files import read_source
 
 TRUTH_NAME, ANCHORS_NAME = "truth.csv", "anchors.geojson"
 
@@ -34,15 +36,6 @@ class Written:
     truth: Path | None
     anchors: Path | None
     pictures: tuple[PictureFolder, ...] = ()
-
-
-def read_source(folder: Path, name: str) -> SourceText:
-    """A file's text. Raises InputError if it is not there or not UTF-8."""
-    path = folder / name
-    try:
-        return SourceText(str(path), path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from error
 
 
 def write_conversion(conversion: Conversion, out_dir: Path) -> Written:
@@ -97,6 +90,11 @@ def convert_mrclam(source: Path, out_dir: Path) -> Written:
 def _robot_sources(source: Path, robot: int) -> RobotSources:
     odometry, measurement, truth = (read_source(source, name) for name in robot_files(robot))
     return RobotSources(robot=robot, odometry=odometry, measurement=measurement, truth=truth)
+
+
+def convert_kitti(source: Path, out_dir: Path) -> WrittenClouds:
+    """The KITTI raw drive of a folder as a log. Raises InputError."""
+    return write_cloud_drive(kitti_drive(source), out_dir)
 
 
 def convert_table(manifest_path: Path, out_dir: Path, *, data_dir: Path | None = None) -> Written:

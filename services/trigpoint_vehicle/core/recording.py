@@ -1,8 +1,10 @@
 """One drive's events put in order of time and numbered, as a vehicle would have sent them."""
 
 import hashlib
-from collections.abc import Iterable
+import heapq
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 from trigpoint.events.corrected import AnchorLabelled
 from trigpoint.events.envelope import Envelope, EventIdentity
@@ -51,3 +53,17 @@ def recording_of(described: VehicleDescribed, timed: Iterable[Timed], *, boot_id
         for sequence, (stamp_ns, event) in enumerate(described_first + ordered)
     )
     return Recording(vehicle=vehicle, rows=rows)
+
+
+def merged_rows(
+    described: VehicleDescribed, streams: Iterable[Iterable[Timed]], *, boot_id: str
+) -> Iterator[Envelope[Observed]]:
+    """As a recording's rows, from streams that are each in order of stamp, one event of each in memory at a time.
+
+    A stream that goes back in time keeps its own order.
+    """
+    merged = heapq.merge(*streams, key=lambda pair: pair[0])
+    first = next(merged, None)
+    opening: list[Timed] = [(0, described)] if first is None else [(first[0], described), first]
+    for sequence, (stamp_ns, event) in enumerate(chain(opening, merged)):
+        yield Envelope(EventIdentity(described.vehicle, boot_id, sequence), stamp_ns, event)
