@@ -20,6 +20,7 @@ from trigpoint_vehicle.core.table_manifest import parsed_manifest
 from trigpoint_vehicle.core.table_rows import converted_tables
 from trigpoint_vehicle.core.victoria_park import GPS, INPUTS, MEASUREMENTS, victoria_park
 from trigpoint_vehicle.kitti_files import kitti_drive
+from trigpoint_vehicle.ros_bags import BagChoice, bag_drive, opened_bag
 from trigpoint_vehicle.settings import SimulationSettings
 from trigpoint_vehicle.source_files import read_source
 
@@ -95,6 +96,12 @@ def _robot_sources(source: Path, robot: int) -> RobotSources:
 def convert_kitti(source: Path, out_dir: Path) -> WrittenClouds:
     """The KITTI raw drive of a folder as a log. Raises InputError."""
     return write_cloud_drive(kitti_drive(source), out_dir)
+
+
+def convert_bag(source: Path, out_dir: Path, choice: BagChoice) -> WrittenClouds:
+    """A ROS bag, of ROS 1 or 2, as a log. Raises InputError."""
+    with opened_bag(source) as reader:
+        return write_cloud_drive(bag_drive(reader, source, choice), out_dir)
 
 
 def convert_table(manifest_path: Path, out_dir: Path, *, data_dir: Path | None = None) -> Written:
