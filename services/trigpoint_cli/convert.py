@@ -7,7 +7,7 @@ from typing import Any
 import click
 import numpy as np
 
-from trigpoint_cli.output import Answer, Screen, answering
+from trigpoint_cli.output import Answer, JsonObject, Screen, answering
 from trigpoint_vehicle import app as vehicle
 from trigpoint_vehicle.app import Written
 from trigpoint_vehicle.cloud_conversion import WrittenClouds
@@ -23,14 +23,17 @@ def command() -> None:
 
 
 def _answer(written: Written) -> Answer:
-    values = {
+    values: JsonObject = {
         "logs": [str(path) for path in written.logs],
         "vehicles": {path.stem: {"log": str(path), "size_bytes": path.stat().st_size} for path in written.logs},
         "truth": None if written.truth is None else str(written.truth),
         "anchors": None if written.anchors is None else str(written.anchors),
     }
     beside = [path for path in (written.truth, written.anchors) if path is not None]
-    return Answer(values, tuple(f"wrote {path}" for path in (*written.logs, *beside)))
+    aside = written.left_aside
+    if aside.counts:
+        values["left_aside"] = dict(aside.counts)
+    return Answer(values, tuple(f"wrote {path}" for path in (*written.logs, *beside)), aside.complaints())
 
 
 @command.command("victoria-park")

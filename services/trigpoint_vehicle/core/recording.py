@@ -69,6 +69,16 @@ def merged_rows(
         yield Envelope(EventIdentity(described.vehicle, boot_id, sequence), stamp_ns, event)
 
 
+def rows_with(recording: Recording, streams: Iterable[Iterable[Timed]]) -> Iterator[Envelope[Observed]]:
+    """A recording's rows numbered anew with those of streams among them, each in order of stamp."""
+    described, *others = recording.rows
+    timed: list[Timed] = [(row.stamp_ns, row.event) for row in others]
+    event = described.event
+    if not isinstance(event, VehicleDescribed):
+        raise TypeError(f"a recording opens with {type(event).__name__}, not with VehicleDescribed")
+    return merged_rows(event, (timed, *streams), boot_id=described.identity.boot_id)
+
+
 def nearly_ordered(timed: Iterable[Timed], *, span_ns: int) -> Iterator[Timed]:
     """Events that came late by up to `span_ns` put in order of stamp; what came later still keeps its place."""
     waiting: list[tuple[int, int, Observed]] = []
