@@ -7,8 +7,11 @@ from pathlib import Path
 
 from trigpoint.errors import InputError
 from trigpoint.events.observed import VehicleDescribed
+from trigpoint.events.scanned import PointsScanned
 from trigpoint.logs.vehicle_log import write_vehicle_log
 from trigpoint_vehicle.core.recording import Timed, merged_rows
+
+POINTS_LIMIT = 2_000_000  # of a sweep in a log: 44 MB, and far more than ingest takes
 
 
 @dataclass(slots=True)
@@ -53,7 +56,7 @@ def write_cloud_drive(drive: CloudDrive, out_dir: Path) -> WrittenClouds:
     """
     vehicle, counts = drive.described.vehicle, Counter[str]()
     path = out_dir / f"{vehicle}.mcap"
-    streams = [_counted(stream, counts) for stream in drive.streams]
+    streams = [_counted(writable(stream, drive.left_aside), counts) for stream in drive.streams]
     try:
         out_dir.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -66,3 +69,13 @@ def _counted(stream: Iterable[Timed], counts: Counter[str]) -> Iterator[Timed]:
     for stamp_ns, event in stream:
         counts[type(event).__name__] += 1
         yield stamp_ns, event
+
+
+def writable(stream: Iterable[Timed], aside: LeftAside) -> Iterator[Timed]:
+    """The events but for sweeps that are too large for a log, which are left aside."""
+    for stamp_ns, event in stream:
+        if isinstance(event, PointsScanned) and len(event.point_m) > POINTS_LIMIT:
+            detail = f"{len(event.point_m)} points at {stamp_ns} ns, limit {POINTS_LIMIT}"
+            aside.add("too many points", detail)
+        else:
+            yield stamp_ns, event

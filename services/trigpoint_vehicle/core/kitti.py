@@ -26,7 +26,7 @@ NS_PER_S = 1_000_000_000
 FIRST_STAMP_NS = 946_684_800_000_000_000  # 2000-01-01T00:00:00Z stands for scan 0 where the files hold no time
 STEP_NS = NS_PER_S // 10  # 10 Hz nominal
 BIN_COLUMNS = 4  # x, y, z, reflectance
-RING_LEAST = 16  # points: the azimuth may fall twice where it trembles about straight ahead
+RING_LEAST = 16  # points: where the azimuth trembles about straight ahead, it falls more often
 NEW_RING_RAD = math.pi  # the azimuth falls by more than this where the next laser's turn begins
 
 # Base: on the road under the OXTS, which stands over the rear axle; it reports its own position.
@@ -155,7 +155,7 @@ def laser_of_point(azimuth_rad: Floats) -> NDArray[np.uint16]:
     straight ahead to the left. A point without azimuth (NaN) has the laser of the one before it."""
     seen = np.flatnonzero(np.isfinite(azimuth_rad))
     begins = np.flatnonzero(np.diff(azimuth_rad[seen] % (2.0 * math.pi)) < -NEW_RING_RAD) + 1
-    begins = begins[np.diff(begins, prepend=-RING_LEAST) >= RING_LEAST]
+    begins = begins[(np.diff(begins, prepend=-RING_LEAST) >= RING_LEAST) & (len(seen) - begins >= RING_LEAST)]
     is_first = np.zeros(len(azimuth_rad), dtype=np.bool_)
     is_first[seen[begins]] = True
     ring = np.cumsum(is_first)

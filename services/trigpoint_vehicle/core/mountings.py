@@ -20,6 +20,24 @@ class Mounting:
     position_m: Floats
     orientation: Floats
 
+    def compose(self, other: "Mounting") -> "Mounting":
+        """`T_a_c` from this `T_a_b` and `T_b_c`."""
+        position_m = self.position_m + rotated(self.orientation, other.position_m)
+        return Mounting(position_m, product(self.orientation, other.orientation))
+
+
+def product(left: Floats, right: Floats) -> Floats:
+    """The quaternion (4,) x, y, z, w that turns by `right`, then by `left`."""
+    vector = left[3] * right[:3] + right[3] * left[:3] + np.cross(left[:3], right[:3])
+    return np.append(vector, left[3] * right[3] - left[:3] @ right[:3])
+
+
+def rotated(orientation: Floats, vector_m: Floats) -> Floats:
+    """A vector (3,) turned by a unit quaternion (4,) x, y, z, w."""
+    twice = 2.0 * np.cross(orientation[:3], vector_m)
+    turned: Floats = vector_m + orientation[3] * twice + np.cross(orientation[:3], twice)
+    return turned
+
 
 AT_BASE = Mounting(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
 

@@ -67,3 +67,29 @@ def merged_rows(
     opening: list[Timed] = [(0, described)] if first is None else [(first[0], described), first]
     for sequence, (stamp_ns, event) in enumerate(chain(opening, merged)):
         yield Envelope(EventIdentity(described.vehicle, boot_id, sequence), stamp_ns, event)
+
+
+def rows_with(recording: Recording, streams: Iterable[Iterable[Timed]]) -> Iterator[Envelope[Observed]]:
+    """A recording's rows numbered anew with those of streams among them, each in order of stamp."""
+    described, *others = recording.rows
+    timed: list[Timed] = [(row.stamp_ns, row.event) for row in others]
+    event = described.event
+    if not isinstance(event, VehicleDescribed):
+        raise TypeError(f"a recording opens with {type(event).__name__}, not with VehicleDescribed")
+    return merged_rows(event, (timed, *streams), boot_id=described.identity.boot_id)
+
+
+def nearly_ordered(timed: Iterable[Timed], *, span_ns: int) -> Iterator[Timed]:
+    """Events that came late by up to `span_ns` put in order of stamp; what came later still keeps its place."""
+    waiting: list[tuple[int, int, Observed]] = []
+    newest_ns = 0
+    for number, (stamp_ns, event) in enumerate(timed):
+        newest_ns = max(newest_ns, stamp_ns)
+        heapq.heappush(waiting, (stamp_ns, number, event))
+        while newest_ns - waiting[0][0] > span_ns:
+            stamp_ns, _, event = heapq.heappop(waiting)
+            yield stamp_ns, event
+            if not waiting:
+                break
+    for stamp_ns, _, event in sorted(waiting, key=lambda row: row[:2]):
+        yield stamp_ns, event
