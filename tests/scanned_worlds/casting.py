@@ -87,7 +87,11 @@ def swept(
     range_m += (rng or np.random.default_rng(1)).normal(0.0, sensor.sigma_m, len(range_m))
     range_m[~(range_m < RANGE_M)] = np.nan
     unit = np.column_stack(
-        [np.cos(elevation_rad) * np.cos(azimuth_rad), np.cos(elevation_rad) * np.sin(azimuth_rad), np.sin(elevation_rad)]
+        [
+            np.cos(elevation_rad) * np.cos(azimuth_rad),
+            np.cos(elevation_rad) * np.sin(azimuth_rad),
+            np.sin(elevation_rad),
+        ]
     )
     lasers = len(sensor.elevation_deg)
     return PointsScanned(
