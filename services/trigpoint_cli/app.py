@@ -30,6 +30,7 @@ COMMANDS = {
     "ingest": ("trigpoint_cli.ingest", "Take vehicles' logs into a data directory."),
     "anchors": ("trigpoint_cli.anchors", "Take in anchors labelled in aerial images, list them, take them back."),
     "drives": ("trigpoint_cli.drives", "Say which drives there are, and which of them the map is solved without."),
+    "perceive": ("trigpoint_cli.perceive", "Find poles and building corners in lidar sweeps, and lidar odometry."),
     "build": ("trigpoint_cli.build", "Filter, solve a map version, and bring the landmark database up to it."),
     "evaluate": ("trigpoint_cli.evaluate", "Measure a map against withheld fixes, withheld anchors or truth."),
     "landmarks": ("trigpoint_cli.landmarks", "Ask for landmarks."),

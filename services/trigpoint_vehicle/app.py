@@ -1,7 +1,7 @@
 """Reads recorded data or simulates a campus, and writes vehicles' logs with truth and anchors beside them."""
 
 import logging
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from tqdm import tqdm
@@ -10,16 +10,20 @@ from trigpoint.errors import InputError
 from trigpoint.events.truth import truth_lines
 from trigpoint.logs.vehicle_log import write_vehicle_log
 from trigpoint_vehicle.aerial_files import PictureFolder, write_pictures
+from trigpoint_vehicle.cloud_conversion import LeftAside, WrittenClouds, write_cloud_drive
+from trigpoint_vehicle.cloud_files import VehicleScans, listed_files
 from trigpoint_vehicle.core.aerial import aerial_pictures
 from trigpoint_vehicle.core.anchors_geojson import anchors_geojson
 from trigpoint_vehicle.core.campus import conversion_of, simulate_campus
 from trigpoint_vehicle.core.mrclam import BARCODES, LANDMARKS, RobotSources, mrclam, robot_files, robot_numbers
 from trigpoint_vehicle.core.recording import Conversion
 from trigpoint_vehicle.core.table_manifest import parsed_manifest
-from trigpoint_vehicle.core.table_rows import converted_tables
-from trigpoint_vehicle.core.text_tables import SourceText
+from trigpoint_vehicle.core.table_rows import converted_tables, named_scans
 from trigpoint_vehicle.core.victoria_park import GPS, INPUTS, MEASUREMENTS, victoria_park
+from trigpoint_vehicle.kitti_files import kitti_drive
+from trigpoint_vehicle.ros_bags import BagChoice, bag_drive, opened_bag
 from trigpoint_vehicle.settings import SimulationSettings
+from trigpoint_vehicle.source_files import read_source
 
 TRUTH_NAME, ANCHORS_NAME = "truth.csv", "anchors.geojson"
 
@@ -33,20 +37,13 @@ class Written:
     logs: tuple[Path, ...]
     truth: Path | None
     anchors: Path | None
+    left_aside: LeftAside = field(default_factory=LeftAside)
     pictures: tuple[PictureFolder, ...] = ()
 
 
-def read_source(folder: Path, name: str) -> SourceText:
-    """A file's text. Raises InputError if it is not there or not UTF-8."""
-    path = folder / name
-    try:
-        return SourceText(str(path), path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from error
-
-
-def write_conversion(conversion: Conversion, out_dir: Path) -> Written:
-    """One `<vehicle>.mcap` a vehicle, `truth.csv` and `anchors.geojson` where there are any.
+def write_conversion(conversion: Conversion, out_dir: Path, scans: VehicleScans | None = None) -> Written:
+    """One `<vehicle>.mcap` a vehicle, with its `scans` read one by one, `truth.csv` and `anchors.geojson` where there
+    are any.
 
     Raises InputError for a folder that cannot be written, AppendFailed for a log.
     """
@@ -57,21 +54,26 @@ def write_conversion(conversion: Conversion, out_dir: Path) -> Written:
     has_truth = bool(known.paths or known.landmarks or known.labels or known.fixes)
     try:
         out_dir.mkdir(parents=True, exist_ok=True)
-        logs = tuple(_written_logs(conversion, out_dir))
+        logs = tuple(_written_logs(conversion, out_dir, scans or VehicleScans()))
         if has_truth:
             truth.write_text("".join(truth_lines(known)), encoding="utf-8")
         if conversion.anchors:
             anchors.write_text(anchors_geojson(conversion.anchors), encoding="utf-8")
     except OSError as error:
         raise InputError(f"{out_dir}: cannot be written: {error}") from error
-    return Written(logs=logs, truth=truth if has_truth else None, anchors=anchors if conversion.anchors else None)
+    return Written(
+        logs=logs,
+        truth=truth if has_truth else None,
+        anchors=anchors if conversion.anchors else None,
+        left_aside=LeftAside() if scans is None else scans.left_aside,
+    )
 
 
-def _written_logs(conversion: Conversion, out_dir: Path) -> list[Path]:
+def _written_logs(conversion: Conversion, out_dir: Path, scans: VehicleScans) -> list[Path]:
     logs = []
     for recording in tqdm(conversion.recordings, desc="writing logs", unit="vehicle", disable=None):
         path = out_dir / f"{recording.vehicle}.mcap"
-        write_vehicle_log(path, recording.rows, vehicle=recording.vehicle)
+        write_vehicle_log(path, scans.rows_of(recording), vehicle=recording.vehicle)
         logs.append(path)
     return logs
 
@@ -99,6 +101,17 @@ def _robot_sources(source: Path, robot: int) -> RobotSources:
     return RobotSources(robot=robot, odometry=odometry, measurement=measurement, truth=truth)
 
 
+def convert_kitti(source: Path, out_dir: Path) -> WrittenClouds:
+    """The KITTI raw drive of a folder as a log. Raises InputError."""
+    return write_cloud_drive(kitti_drive(source), out_dir)
+
+
+def convert_bag(source: Path, out_dir: Path, choice: BagChoice) -> WrittenClouds:
+    """A ROS bag, of ROS 1 or 2, as a log. Raises InputError."""
+    with opened_bag(source) as reader:
+        return write_cloud_drive(bag_drive(reader, source, choice), out_dir)
+
+
 def convert_table(manifest_path: Path, out_dir: Path, *, data_dir: Path | None = None) -> Written:
     """The tables a manifest describes as logs, truth and anchors; `data_dir` replaces the manifest's.
 
@@ -108,8 +121,9 @@ def convert_table(manifest_path: Path, out_dir: Path, *, data_dir: Path | None =
     manifest = parsed_manifest(text.name, text.text)
     folder = data_dir or manifest_path.parent / manifest.data_dir
     names = tqdm(manifest.files(), desc="reading", unit="file", disable=None)
-    sources = [read_source(folder, name) for name in names]
-    return write_conversion(converted_tables(manifest, text.text, sources), out_dir)
+    sources = [listed_files(folder, name) if "*" in name else read_source(folder, name) for name in names]
+    conversion = converted_tables(manifest, text.text, sources)
+    return write_conversion(conversion, out_dir, VehicleScans(folder, named_scans(manifest, sources)))
 
 
 def record_campus(settings: SimulationSettings, out_dir: Path, *, aerial: Path | None = None) -> Written:

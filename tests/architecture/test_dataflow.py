@@ -59,7 +59,9 @@ def test_a_stream_has_one_writer() -> None:
 
 
 def test_every_event_class_is_in_the_table() -> None:
-    classes = set().union(*(events_of(module) for module in (observed, scanned, corrected, estimated, perceived, mapped)))
+    classes = set().union(
+        *(events_of(module) for module in (observed, scanned, corrected, estimated, perceived, mapped))
+    )
     assert classes == {flow.event for flow in dataflow.FLOWS}
 
 

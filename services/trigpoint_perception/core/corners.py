@@ -15,7 +15,8 @@ SAME_CORNER_M = 0.6  # two pairs of walls whose corners are nearer than this sha
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PerceivedCorner:
-    """A building's corner in the base frame (2,) with covariance (2, 2) in m^2; the lower wall's top above ground; `points` on both walls."""
+    """A building's corner in the base frame (2,) with covariance (2, 2) in m^2; the lower wall's top above ground, and
+    the points on both walls."""
 
     position_m: Floats
     covariance_m2: Floats

@@ -38,16 +38,6 @@ class NumberedSweep:
     scanned: PointsScanned
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Counts:
-    """What became of the sweeps so far: taken, refused by reason, begun anew for a clock jump or a gap, not matched."""
-
-    sweeps: int = 0
-    refused: tuple[tuple[str, int], ...] = ()
-    restarts: int = 0
-    unmatched: int = 0
-
-
 @dataclass(frozen=True, slots=True)
 class _Waiting:
     """A sweep that waits for the ones after it to confirm what was seen in it."""
@@ -79,19 +69,19 @@ class SweepFollower:
         self._last: _Placed | None = None
         self._velocity: Floats | None = None
         self._waiting: deque[_Waiting] = deque()
-        self.counts = Counts()
+        self._number = 0  # of the sweep, refused ones too
+        self.restarts = 0  # where the clock jumped or sweeps were missing
 
     def take(self, numbered: NumberedSweep) -> tuple[tuple[int, Perceived], ...]:
         """Events with their stamps that are certain after one more sweep, those of earlier sweeps first."""
         restarted: tuple[tuple[int, Perceived], ...] = ()
-        self.counts = replace(self.counts, sweeps=self.counts.sweeps + 1)
+        self._number += 1
         if self._is_apart(numbered.stamp_ns):
             restarted = self._restarted()
         try:
             self._waiting.append(self._seen(numbered))
         except EventRejected as error:
             self._waiting.append(_Waiting(numbered, str(error)))
-            self._count_refusal(error.reason)
         ready = len(self._waiting) - self._settings.track.window + 1
         return (*restarted, *(each for _ in range(ready) for each in self._told(self._waiting.popleft())))
 
@@ -113,16 +103,11 @@ class SweepFollower:
         self._odometry = LidarOdometry(self._settings.odometry)
         self._tracks = Tracks(next_number=self._tracks.next_number)
         self._last = None
-        self.counts = replace(self.counts, restarts=self.counts.restarts + 1)
+        self.restarts += 1
         return told
 
-    def _count_refusal(self, reason: str) -> None:
-        counted = dict(self.counts.refused)
-        counted[reason] = counted.get(reason, 0) + 1
-        self.counts = replace(self.counts, refused=tuple(sorted(counted.items())))
-
     def _seen(self, numbered: NumberedSweep) -> _Waiting:
-        """One sweep searched, matched and tracked. Raises EventRejected where it is not usable; nothing changed then."""
+        """One sweep searched, matched and tracked. Raises EventRejected where it is not usable."""
         sweep = self._still(usable_sweep(numbered.scanned, self._settings.sweep), numbered.stamp_ns)
         sights = sights_of(sweep, self._settings)
         match = self._odometry.matched(sweep.point_m, self._expected(numbered.stamp_ns))
@@ -134,7 +119,7 @@ class SweepFollower:
             self._tracks,
             sights,
             planar_pose(match.T_odom_base),
-            sweep=self.counts.sweeps,
+            sweep=self._number,
             settings=self._settings.track,
         )
         return _Waiting(numbered, "", sights, numbers, odometry)
@@ -182,10 +167,7 @@ class SweepFollower:
 
     def _odometry_event(self, numbered: NumberedSweep, match: Match) -> OdometryMatched | None:
         last = self._last
-        if last is None:
-            return None
-        if match.refusal or last.match.refusal:
-            self.counts = replace(self.counts, unmatched=self.counts.unmatched + 1)
+        if last is None or match.refusal or last.match.refusal:
             return None
         motion, covariance = relative_pose(last.match, match, self._settings.odometry)
         return OdometryMatched(

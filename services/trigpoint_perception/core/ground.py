@@ -9,6 +9,8 @@ from trigpoint_perception.settings import GroundSettings
 
 Floats = NDArray[np.float64]
 
+SLOPE_OF_ANY = 0.2  # deeper than this below the base frame's ground is a mirrored point, and no ground
+DEPTH_OF_ANY_M = 0.25
 SMOOTHED_SECTORS = 2  # to either side: a profile is the median of five
 
 
@@ -19,37 +21,38 @@ def heights_above_ground(sweep: Sweep, settings: GroundSettings, *, range_max_m:
     `slope_max` and a kerb allow holds no ground; between bins the profile is straight, beyond the last it is level.
     """
     bins = int(np.ceil(range_max_m / settings.bin_m)) + 1
-    profile = _profiles(
-        sweep.point_m, sweep.sensor_m, settings.sectors, bins, settings.bin_m, settings.slope_max, settings.step_m
-    )
+    lowest = _lowest(sweep.point_m, sweep.sensor_m, settings.sectors, bins, settings.bin_m)
+    profile = _profiles(lowest, settings.bin_m, settings.slope_max, settings.step_m)
     turned = [np.roll(profile, shift, axis=0) for shift in range(-SMOOTHED_SECTORS, SMOOTHED_SECTORS + 1)]
     return _heights(sweep.point_m, sweep.sensor_m, np.median(turned, axis=0), settings.bin_m)
 
 
 @compiled
-def _profiles(
-    point_m: Floats, sensor_m: Floats, sectors: int, bins: int, bin_m: float, slope_max: float, step_m: float
-) -> Floats:
-    """Ground heights (sectors, bins) at the bins' middles."""
+def _lowest(point_m: Floats, sensor_m: Floats, sectors: int, bins: int, bin_m: float) -> Floats:
+    """The lowest point's height (sectors, bins), infinite where a bin holds none."""
     lowest = np.full((sectors, bins), np.inf)
     for row in range(len(point_m)):
         x = point_m[row, 0] - sensor_m[0]
         y = point_m[row, 1] - sensor_m[1]
-        z = point_m[row, 2]
         run = np.hypot(x, y)
-        if z < -slope_max * run - 2.0 * step_m:  # below any ground that slope allows: a mirrored point
+        if point_m[row, 2] < -SLOPE_OF_ANY * run - DEPTH_OF_ANY_M:
             continue
         sector = int((np.arctan2(y, x) + np.pi) / (2.0 * np.pi) * sectors) % sectors
         number = min(int(run / bin_m), bins - 1)
-        lowest[sector, number] = min(lowest[sector, number], z)
+        lowest[sector, number] = min(lowest[sector, number], point_m[row, 2])
+    return lowest
+
+
+@compiled
+def _profiles(lowest: Floats, bin_m: float, slope_max: float, step_m: float) -> Floats:
+    """Ground heights (sectors, bins) at the bins' middles."""
+    sectors, bins = lowest.shape
     ground = np.zeros((sectors, bins))
     for sector in range(sectors):
         last, height = -1, 0.0
         for number in range(bins):
-            allowed = slope_max * (number - last) * bin_m + step_m
-            if last < 0:
-                allowed = slope_max * (number + 0.5) * bin_m + step_m
-            if abs(lowest[sector, number] - height) > allowed:
+            steps = number - last if last >= 0 else number + 0.5
+            if abs(lowest[sector, number] - height) > slope_max * steps * bin_m + step_m:
                 continue
             for between in range(last + 1, number):
                 share = (between - last) / (number - last)
@@ -57,8 +60,7 @@ def _profiles(
             height = lowest[sector, number]
             ground[sector, number] = height
             last = number
-        for beyond in range(last + 1, bins):
-            ground[sector, beyond] = height
+        ground[sector, last + 1 :] = height
     return ground
 
 

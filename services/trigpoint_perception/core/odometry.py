@@ -15,7 +15,7 @@ KEPT_SWEEPS = 100  # a voxel not hit for so long is forgotten
 CLEARED_EVERY = 10
 NEIGHBOURS = 10  # for a point's own covariance
 ROTATION_STEP_RAD = 1e-4
-ITERATIONS_MAX = 30
+ITERATIONS_MAX = 60
 PLANAR = np.ix_([3, 4, 2], [3, 4, 2])  # x, y, heading of a twist: rotation first, then translation
 
 

@@ -64,7 +64,7 @@ def perceived_poles(
     if len(thin) < settings.rings_min:
         return ()
     centre_m = _segment_centres(segments, thin, sensor_m)
-    scene = _Scene(ordered, segments, sensor_m, settings, _slope_top(ordered, sensor_m))
+    scene = _Scene(ordered, segments, sensor_m, settings, _slope_top(ordered, sensor_m), _flanking(ordered))
     poles = [scene.pole_of(thin[rows], centre_m[rows]) for rows in _stacks(centre_m, settings)]
     return tuple(pole for pole in poles if pole is not None)
 
@@ -103,6 +103,12 @@ def _slope_top(ordered: OrderedSweep, sensor_m: Floats) -> float:
     return float(np.median((ordered.point_m[begin:, 2] - sensor_m[2]) / np.maximum(ordered.run_m[begin:], 0.1)))
 
 
+def _flanking(ordered: OrderedSweep) -> Floats:
+    """Points (n, 2) at the height of what may stand beside a pole."""
+    low_m, high_m = FLANK_HEIGHT_M
+    return ordered.point_m[(ordered.height_m >= low_m) & (ordered.height_m <= high_m), :2]
+
+
 @dataclass(frozen=True, slots=True)
 class _Scene:
     ordered: OrderedSweep
@@ -110,6 +116,7 @@ class _Scene:
     sensor_m: Floats
     settings: PoleSettings
     slope_top: float  # rise per run of the highest laser
+    flanking_m: Floats  # (n, 2) points at the height of what may stand beside a pole
 
     def pole_of(self, chosen: Ints, centre_m: Floats) -> PerceivedPole | None:
         """The pole that a stack of segments is, None if it is none."""
@@ -159,9 +166,7 @@ class _Scene:
             width_m=self.segments.width_m[chosen],
             step_rad=self.ordered.step_rad,
         )
-        return fitted_circle(
-            arc, range_sigma_m=self.settings.range_sigma_m, radius_max_m=self.settings.radius_max_m
-        )
+        return fitted_circle(arc, range_sigma_m=self.settings.range_sigma_m, radius_max_m=self.settings.radius_max_m)
 
     def _rows(self, segment: int) -> Ints:
         """The ordered sweep's rows of a segment."""
@@ -180,9 +185,7 @@ class _Scene:
     def _is_flanked(self, circle: Circle, points: int) -> bool:
         """Whether something stands beside it at the same distance: a hedge, a car, a wall with windows."""
         sight = circle.centre_m - self.sensor_m[:2]
-        beside = _beside(
-            self.ordered.point_m, self.ordered.height_m, circle.centre_m, sight / np.hypot(*sight), circle.radius_m
-        )
+        beside = _beside(self.flanking_m, circle.centre_m, sight / np.hypot(sight[0], sight[1]), circle.radius_m)
         return beside > FLANK_SHARE * points
 
     def _class_of(self, circle: Circle, top_m: float, points: int) -> PoleClass:
@@ -195,7 +198,9 @@ class _Scene:
             & (height_m >= PANEL_HEIGHT_M[0])
             & (height_m <= PANEL_HEIGHT_M[1])
         )
-        crown = (away_m < CROWN_REACH_M) & (height_m > max(top_m - CROWN_FROM_M, 1.8)) & (away_m > circle.radius_m + 0.25)
+        crown = (
+            (away_m < CROWN_REACH_M) & (height_m > max(top_m - CROWN_FROM_M, 1.8)) & (away_m > circle.radius_m + 0.25)
+        )
         if self.segments.count[crown].sum() >= CROWN_SHARE * points or circle.radius_m > TRUNK_RADIUS_M:
             return "trunk"
         return "sign" if np.count_nonzero(panel) >= PANEL_RINGS else "pole"
@@ -218,7 +223,7 @@ def _axis(centre_m: Floats, ring: Ints, height_m: Floats, outlier_m: float) -> t
 
 
 @compiled
-def _beside(point_m: Floats, height_m: Floats, centre_m: Floats, sight: Floats, radius_m: float) -> int:
+def _beside(point_m: Floats, centre_m: Floats, sight: Floats, radius_m: float) -> int:
     """The number of points to both sides of a pole, seen along the unit vector `sight`, as far away as it is."""
     count = 0
     for row in range(len(point_m)):
@@ -226,6 +231,6 @@ def _beside(point_m: Floats, height_m: Floats, centre_m: Floats, sight: Floats, 
         if abs(x) > FLANK_REACH_M or abs(y) > FLANK_REACH_M:
             continue
         across = abs(x * sight[1] - y * sight[0])
-        if FLANK_HEIGHT_M[0] <= height_m[row] <= FLANK_HEIGHT_M[1] and across > radius_m + FLANK_FREE_M:
+        if across > radius_m + FLANK_FREE_M:
             count += abs(x * sight[0] + y * sight[1]) < FLANK_DEPTH_M
     return count

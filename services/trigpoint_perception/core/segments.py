@@ -81,10 +81,10 @@ def segments_of(ordered: OrderedSweep, *, depth_step_m: float) -> Segments:
     first, count, left, right = _cut(
         ordered.ring_begin, ordered.azimuth_rad, ordered.run_m, ordered.step_rad, depth_step_m
     )
+    seen = np.column_stack([ordered.azimuth_rad, ordered.run_m, ordered.height_m, ordered.point_m])
     azimuth_rad, width_m, near_m, mean_m, mean_height_m = _measured(
-        first, count, ordered.ring_begin, ordered.ring, ordered.azimuth_rad, ordered.run_m, ordered.height_m,
-        ordered.point_m,
-    )  # fmt: skip
+        first, count, ordered.ring_begin, ordered.ring, seen
+    )
     return Segments(
         first=first,
         count=count,
@@ -108,68 +108,54 @@ def _cut(
     left, right = np.empty(total, np.bool_), np.empty(total, np.bool_)
     found = 0
     for ring in range(len(ring_begin) - 1):
-        begin, end = ring_begin[ring], ring_begin[ring + 1]
-        size = end - begin
-        if size < 2:
-            continue
-        cut = np.zeros(size, np.bool_)  # between a point and the next one round the ring
-        gap = np.zeros(size, np.bool_)
-        for number in range(size):
-            here, there = begin + number, begin + (number + 1) % size
-            turn = azimuth_rad[there] - azimuth_rad[here]
-            if turn < 0.0:
-                turn += 2.0 * np.pi
-            gap[number] = turn > GAP_STEPS * step_rad
-            allowed = depth_step_m + 2.0 * turn * min(run_m[here], run_m[there])
-            cut[number] = gap[number] or abs(run_m[there] - run_m[here]) > allowed
-        start = 0
-        while start < size and not cut[start]:
-            start += 1
-        if start == size:
-            continue  # a ring in one piece: all round the sensor, nothing by itself
-        at = (start + 1) % size
-        seen = 0
-        while seen < size:
-            length = 1
-            while not cut[(at + length - 1) % size]:
-                length += 1
-            last, before, after = (at + length - 1) % size, (at - 1) % size, (at + length) % size
-            first[found], count[found] = begin + at, length
-            left[found] = gap[last] or run_m[begin + after] > run_m[begin + last]
-            right[found] = gap[before] or run_m[begin + before] > run_m[begin + at]
+        begin, size = ring_begin[ring], ring_begin[ring + 1] - ring_begin[ring]
+        run = run_m[begin : begin + size]
+        cut, gap = _cuts(azimuth_rad[begin : begin + size], run, step_rad, depth_step_m)
+        starts = np.nonzero(cut)[0]  # each segment begins after a cut; a ring in one piece is no segment
+        for number in range(len(starts)):
+            before, last = starts[number], starts[(number + 1) % len(starts)]
+            at, after = (before + 1) % size, (last + 1) % size
+            first[found], count[found] = begin + at, (last - before - 1) % size + 1
+            left[found] = gap[last] or run[after] > run[last]
+            right[found] = gap[before] or run[before] > run[at]
             found += 1
-            seen += length
-            at = after
     return first[:found], count[:found], left[:found], right[:found]
 
 
 @compiled
+def _cuts(azimuth_rad: Floats, run_m: Floats, step_rad: float, depth_step_m: float) -> tuple[Bools, Bools]:
+    """Whether a ring is cut between each point (n,) and the next one round, and whether returns are missing there."""
+    size = len(run_m)
+    cut, gap = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
+    if size < 2:
+        return cut, gap
+    for here in range(size):
+        there = (here + 1) % size
+        turn = (azimuth_rad[there] - azimuth_rad[here]) % (2.0 * np.pi)
+        gap[here] = turn > GAP_STEPS * step_rad
+        allowed = depth_step_m + 2.0 * turn * min(run_m[here], run_m[there])
+        cut[here] = gap[here] or abs(run_m[there] - run_m[here]) > allowed
+    return cut, gap
+
+
+@compiled
 def _measured(
-    first: Ints,
-    count: Ints,
-    ring_begin: Ints,
-    ring: Ints,
-    azimuth_rad: Floats,
-    run_m: Floats,
-    height_m: Floats,
-    point_m: Floats,
+    first: Ints, count: Ints, ring_begin: Ints, ring: Ints, seen: Floats
 ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Middle azimuths, widths, nearest distances, means (m, 3) and mean heights; seen (n, 6): azimuth, run, height,
+    x, y, z."""
     size = len(first)
     middle, width, near = np.empty(size), np.empty(size), np.full(size, np.inf)
-    mean, mean_height = np.zeros((size, 3)), np.zeros(size)
+    mean = np.zeros((size, 4))
     for number in range(size):
         begin, end = ring_begin[ring[first[number]]], ring_begin[ring[first[number]] + 1]
         for step in range(count[number]):
             row = begin + (first[number] - begin + step) % (end - begin)
-            near[number] = min(near[number], run_m[row])
-            mean[number] += point_m[row]
-            mean_height[number] += height_m[row]
+            near[number] = min(near[number], seen[row, 1])
+            mean[number] += seen[row, 2:]
         last = begin + (first[number] - begin + count[number] - 1) % (end - begin)
-        turn = azimuth_rad[last] - azimuth_rad[first[number]]
-        if turn < 0.0:
-            turn += 2.0 * np.pi
-        middle[number] = azimuth_rad[first[number]] + 0.5 * turn
+        turn = (seen[last, 0] - seen[first[number], 0]) % (2.0 * np.pi)
+        middle[number] = seen[first[number], 0] + 0.5 * turn
         width[number] = turn * near[number]
         mean[number] /= count[number]
-        mean_height[number] /= count[number]
-    return middle, width, near, mean, mean_height
+    return middle, width, near, mean[:, 1:], mean[:, 0]

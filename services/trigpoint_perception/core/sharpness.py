@@ -12,6 +12,7 @@ RADIUS_M = 0.3
 NEIGHBOURS_MIN = 12
 PLANARITY_MAX = 0.1  # the smallest variance by the middle one: flatter is a plane
 EXTENT_MIN_M2 = 0.004  # of a plane's middle variance: a line along one ring is no plane
+FLOOR_M2 = 2.5e-5  # 5 mm: what is flatter than any sensor measures says nothing of sharpness
 QUERY_ROWS = 20_000  # at once, which bounds memory
 
 
@@ -38,7 +39,7 @@ def sharpness_of(point_m: Floats, query_m: Floats) -> Sharpness:
         _covariances(point_m, tree, query_m[begin : begin + QUERY_ROWS]) for begin in range(0, len(query_m), QUERY_ROWS)
     ]
     values = np.linalg.eigvalsh(np.concatenate([*covariances, np.zeros((0, 3, 3))]))
-    values = np.maximum(values, 1e-12)
+    values = np.maximum(values, FLOOR_M2)
     flat = (values[:, 0] <= PLANARITY_MAX * values[:, 1]) & (values[:, 1] >= EXTENT_MIN_M2)
     entropy = 0.5 * (3.0 * np.log(2.0 * np.pi * np.e) + np.log(values).sum(axis=1))
     return Sharpness(

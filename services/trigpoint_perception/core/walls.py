@@ -12,6 +12,7 @@ from trigpoint_perception.settings import WallSettings
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+Line = tuple[float, float, float, float, float]
 
 MERGE_ANGLE_RAD = 0.09  # 5 degrees
 MERGE_OFFSET_M = 0.15
@@ -45,12 +46,11 @@ def walls_of(ordered: OrderedSweep, sensor_m: Floats, settings: WallSettings) ->
     the chord (Douglas and Peucker 1973, as iterative end-point fit), fitted by least squares, and pieces on one line
     are merged, the longest first.
     """
-    upright = _upright(ordered, sensor_m, settings)
-    sums, extent = _pieces(
-        ordered.point_m, ordered.height_m, ordered.ring, ordered.run_m, upright, ordered.step_rad,
-        np.array([settings.gap_m, settings.split_m, settings.sigma_max_m, PIECE_SHARE * settings.length_min_m]),
-        settings.points_min,
-    )  # fmt: skip
+    rows = np.nonzero(_upright(ordered, sensor_m, settings))[0]
+    seen = np.column_stack([ordered.point_m[rows, :2], ordered.height_m[rows], ordered.ring[rows], ordered.run_m[rows]])
+    length_min_m = PIECE_SHARE * settings.length_min_m
+    limits = np.array([settings.gap_m, settings.split_m, settings.sigma_max_m, length_min_m, settings.points_min])
+    sums, extent = _pieces(seen, ordered.step_rad, limits)
     longest_first = np.argsort(-(extent[:, 1] - extent[:, 0]), kind="stable")
     merged = _merged(sums[longest_first], extent[longest_first])
     return _kept(*merged, settings)
@@ -59,10 +59,9 @@ def walls_of(ordered: OrderedSweep, sensor_m: Floats, settings: WallSettings) ->
 def _upright(ordered: OrderedSweep, sensor_m: Floats, settings: WallSettings) -> Bools:
     """Which points (n,) stand in a cell that is filled from low to high."""
     side = int(2.0 * settings.range_max_m / settings.cell_m) + 1
-    cell = np.floor((ordered.point_m[:, :2] - sensor_m[:2] + settings.range_max_m) / settings.cell_m).astype(np.int64)
-    inside = (ordered.height_m > FROM_M) & (cell >= 0).all(axis=1) & (cell < side).all(axis=1)
-    number = np.where(inside, cell[:, 0] * side + cell[:, 1], -1)
-    return _filled(number, ordered.height_m, side * side, settings.top_min_m, settings.extent_min_m)
+    corner_m = sensor_m[:2] - settings.range_max_m
+    cell = _cells(ordered.point_m, ordered.height_m, corner_m, settings.cell_m, side)
+    return _filled(cell, ordered.height_m, side * side, settings.top_min_m, settings.extent_min_m)
 
 
 def _kept(sums: Floats, extent: Floats, settings: WallSettings) -> Walls:
@@ -92,6 +91,17 @@ def _fitted(sums: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 @compiled
+def _cells(point_m: Floats, height_m: Floats, corner_m: Floats, cell_m: float, side: int) -> Ints:
+    """The cell (n,) of each point in a square grid, -1 for what is near the ground or outside."""
+    cell = np.full(len(point_m), -1, np.int64)
+    for row in range(len(point_m)):
+        column, line = (point_m[row, 0] - corner_m[0]) / cell_m, (point_m[row, 1] - corner_m[1]) / cell_m
+        if height_m[row] > FROM_M and 0.0 <= column < side and 0.0 <= line < side:
+            cell[row] = int(column) * side + int(line)
+    return cell
+
+
+@compiled
 def _filled(cell: Ints, height_m: Floats, cells: int, top_min_m: float, extent_min_m: float) -> Bools:
     low, high = np.full(cells, np.inf), np.full(cells, -np.inf)
     for row in range(len(cell)):
@@ -106,7 +116,7 @@ def _filled(cell: Ints, height_m: Floats, cells: int, top_min_m: float, extent_m
 
 
 @compiled
-def _line(sums: Floats) -> tuple[float, float, float, float, float]:
+def _line(sums: Floats) -> Line:
     """Middle x, y, direction x, y, and root mean square distance of the line of total least squares."""
     count = sums[0]
     x, y = sums[1] / count, sums[2] / count
@@ -117,42 +127,29 @@ def _line(sums: Floats) -> tuple[float, float, float, float, float]:
 
 
 @compiled
-def _pieces(
-    point_m: Floats,
-    height_m: Floats,
-    ring: Ints,
-    run_m: Floats,
-    upright: Bools,
-    step_rad: float,
-    limits: Floats,
-    points_min: int,
-) -> tuple[Floats, Floats]:
-    """Sums (m, 9) and extents (m, 2) along their own lines of the straight pieces of all rings."""
-    rows = np.nonzero(upright)[0]
-    sums, extents = np.empty((len(rows), 9)), np.empty((len(rows), 2))
+def _pieces(seen: Floats, step_rad: float, limits: Floats) -> tuple[Floats, Floats]:
+    """Sums (m, 9) and extents (m, 2) along their own lines of the straight pieces of all rings; seen (n, 5): x, y,
+    height, ring, run; limits (5,): gap, split, sigma, length, points."""
+    sums, extents = np.empty((len(seen), SUMS)), np.empty((len(seen), 2))
     found, begin = 0, 0
-    while begin < len(rows):
+    while begin < len(seen):
         end = begin + 1
-        while end < len(rows):
-            here, before = rows[end], rows[end - 1]
-            apart = np.hypot(point_m[here, 0] - point_m[before, 0], point_m[here, 1] - point_m[before, 1])
-            if ring[here] != ring[before] or apart > limits[0] + 3.0 * step_rad * run_m[before]:
-                break
+        while end < len(seen) and _are_chained(seen[end - 1], seen[end], step_rad, limits[0]):
             end += 1
         stack = [(begin, end)]
         while len(stack) > 0:
             low, high = stack.pop()
-            if high - low < points_min:
+            if high - low < limits[4]:
                 continue
-            at, away = _farthest(point_m, rows, low, high)
+            at, away = _farthest(seen[low:high])
             if away > limits[1]:
-                stack.append((low, at))
-                stack.append((at, high))
+                stack.append((low, low + at))
+                stack.append((low + at, high))
                 continue
-            total = _summed(point_m, height_m, ring, rows, low, high)
-            x, y, dx, dy, sigma = _line(total)
-            least, most = _extent(point_m, rows, low, high, x, y, dx, dy)
-            if most - least >= limits[3] and sigma <= limits[2]:
+            total = _summed(seen[low:high])
+            line = _line(total)
+            least, most = _extent(seen[low:high], line)
+            if most - least >= limits[3] and line[4] <= limits[2]:
                 sums[found] = total
                 extents[found, 0], extents[found, 1] = least, most
                 found += 1
@@ -161,37 +158,42 @@ def _pieces(
 
 
 @compiled
-def _farthest(point_m: Floats, rows: Ints, low: int, high: int) -> tuple[int, float]:
+def _are_chained(before: Floats, here: Floats, step_rad: float, gap_m: float) -> bool:
+    apart = np.hypot(here[0] - before[0], here[1] - before[1])
+    return bool(here[3] == before[3] and apart <= gap_m + 3.0 * step_rad * before[4])
+
+
+@compiled
+def _farthest(seen: Floats) -> tuple[int, float]:
     """The point farthest from the chord between the first and the last, and how far it is."""
-    x, y = point_m[rows[low], 0], point_m[rows[low], 1]
-    dx, dy = point_m[rows[high - 1], 0] - x, point_m[rows[high - 1], 1] - y
+    x, y = seen[0, 0], seen[0, 1]
+    dx, dy = seen[-1, 0] - x, seen[-1, 1] - y
     length = max(np.hypot(dx, dy), 1e-9)
-    at, away = low, 0.0
-    for number in range(low + 1, high - 1):
-        across = abs((point_m[rows[number], 1] - y) * dx - (point_m[rows[number], 0] - x) * dy) / length
+    at, away = 0, 0.0
+    for number in range(1, len(seen) - 1):
+        across = abs((seen[number, 1] - y) * dx - (seen[number, 0] - x) * dy) / length
         if across > away:
             at, away = number, across
     return at, away
 
 
 @compiled
-def _summed(point_m: Floats, height_m: Floats, ring: Ints, rows: Ints, low: int, high: int) -> Floats:
-    total = np.zeros(9)
-    for number in range(low, high):
-        x, y = point_m[rows[number], 0], point_m[rows[number], 1]
+def _summed(seen: Floats) -> Floats:
+    total = np.zeros(SUMS)
+    for number in range(len(seen)):
+        x, y = seen[number, 0], seen[number, 1]
         total[:6] += np.array([1.0, x, y, x * x, x * y, y * y])
-        total[6] = max(total[6], height_m[rows[number]])
-    total[7] = total[8] = ring[rows[low]]
+        total[6] = max(total[6], seen[number, 2])
+    total[7] = total[8] = seen[0, 3]
     return total
 
 
 @compiled
-def _extent(
-    point_m: Floats, rows: Ints, low: int, high: int, x: float, y: float, dx: float, dy: float
-) -> tuple[float, float]:
+def _extent(seen: Floats, line: Line) -> tuple[float, float]:
+    """The least and the greatest place of the points along a line."""
     least, most = np.inf, -np.inf
-    for number in range(low, high):
-        along = (point_m[rows[number], 0] - x) * dx + (point_m[rows[number], 1] - y) * dy
+    for number in range(len(seen)):
+        along = (seen[number, 0] - line[0]) * line[2] + (seen[number, 1] - line[1]) * line[3]
         least, most = min(least, along), max(most, along)
     return least, most
 
@@ -202,33 +204,46 @@ def _merged(sums: Floats, extents: Floats) -> tuple[Floats, Floats]:
     walls, reach = np.empty_like(sums), np.empty_like(extents)
     count = 0
     for piece in range(len(sums)):
-        x, y, dx, dy, _ = _line(sums[piece])
-        joined = False
-        for wall in range(count):
-            wx, wy, wdx, wdy, _ = _line(walls[wall])
-            if abs(dx * wdy - dy * wdx) > np.sin(MERGE_ANGLE_RAD):
-                continue
-            if abs((x - wx) * wdy - (y - wy) * wdx) > MERGE_OFFSET_M:
-                continue
-            one = (x + extents[piece, 0] * dx - wx) * wdx + (y + extents[piece, 0] * dy - wy) * wdy
-            two = (x + extents[piece, 1] * dx - wx) * wdx + (y + extents[piece, 1] * dy - wy) * wdy
-            least, most = min(one, two), max(one, two)
-            if least > reach[wall, 1] + MERGE_GAP_M or most < reach[wall, 0] - MERGE_GAP_M:
-                continue
-            least, most = min(least, reach[wall, 0]), max(most, reach[wall, 1])
-            walls[wall, :6] += sums[piece, :6]
-            walls[wall, 6] = max(walls[wall, 6], sums[piece, 6])
-            walls[wall, 7] = min(walls[wall, 7], sums[piece, 7])
-            walls[wall, 8] = max(walls[wall, 8], sums[piece, 8])
-            nx, ny, ndx, ndy, _ = _line(walls[wall])
-            moved = (wx - nx) * ndx + (wy - ny) * ndy
-            if ndx * wdx + ndy * wdy < 0.0:
-                least, most = -most, -least
-            reach[wall, 0], reach[wall, 1] = least + moved, most + moved
-            joined = True
-            break
-        if not joined:
-            walls[count] = sums[piece]
-            reach[count] = extents[piece]
+        wall = 0
+        while wall < count and not _is_part(walls[wall], reach[wall], sums[piece], extents[piece]):
+            wall += 1
+        if wall == count:
+            walls[count], reach[count] = sums[piece], extents[piece]
             count += 1
+        else:
+            _join(walls[wall], reach[wall], sums[piece], extents[piece])
     return walls[:count], reach[:count]
+
+
+@compiled
+def _along(extent: Floats, line: Line, on: Line) -> tuple[float, float]:
+    """An extent along one line as an extent along another one."""
+    ends = np.empty(2)
+    for end in range(2):
+        x, y = line[0] + extent[end] * line[2] - on[0], line[1] + extent[end] * line[3] - on[1]
+        ends[end] = x * on[2] + y * on[3]
+    return ends.min(), ends.max()
+
+
+@compiled
+def _is_part(wall: Floats, reach: Floats, piece: Floats, extent: Floats) -> bool:
+    on, line = _line(wall), _line(piece)
+    if abs(line[2] * on[3] - line[3] * on[2]) > np.sin(MERGE_ANGLE_RAD):
+        return False
+    if abs((line[0] - on[0]) * on[3] - (line[1] - on[1]) * on[2]) > MERGE_OFFSET_M:
+        return False
+    least, most = _along(extent, line, on)
+    return bool(least <= reach[1] + MERGE_GAP_M and most >= reach[0] - MERGE_GAP_M)
+
+
+@compiled
+def _join(wall: Floats, reach: Floats, piece: Floats, extent: Floats) -> None:
+    """The piece added to the wall, in place."""
+    before, line = _line(wall), _line(piece)
+    wall[:6] += piece[:6]
+    wall[6] = max(wall[6], piece[6])
+    wall[7], wall[8] = min(wall[7], piece[7]), max(wall[8], piece[8])
+    after = _line(wall)
+    least, most = _along(reach, before, after)
+    low, high = _along(extent, line, after)
+    reach[0], reach[1] = min(least, low), max(most, high)

@@ -107,12 +107,12 @@ def _with_covariance(event_class: type[EventT], message_class: type[MessageT]) -
     values_of, covariance_of = attrgetter(*names), attrgetter("covariance")
 
     def message_of(event: EventT) -> MessageT:
-        scalars = dict(zip(names, values_of(event), strict=True))
-        return message_class(**scalars, covariance=_listed(covariance_of(event), (3, 3)))
+        values = dict(zip(names, values_of(event), strict=True))
+        return message_class(**values | {"covariance": _listed(covariance_of(event), (3, 3))})
 
     def event_of(message: MessageT) -> EventT:
-        scalars = dict(zip(names, values_of(message), strict=True))
-        return event_class(**scalars, covariance=_array(covariance_of(message), (3, 3)))
+        values = dict(zip(names, values_of(message), strict=True))
+        return event_class(**values | {"covariance": _array(covariance_of(message), (3, 3))})
 
     return Form(event_class, message_class, message_of, event_of)
 

@@ -75,7 +75,7 @@ def test_what_a_vehicle_reads_beside_its_own_is_what_a_client_reads() -> None:
 
 
 def test_the_role_of_all_services_is_all_of_them_together() -> None:
-    all_of_them = (Role.INGEST, Role.FILTERING, Role.OPTIMISATION, Role.LANDMARKS, Role.ANSWERS)
+    all_of_them = (Role.INGEST, Role.FILTERING, Role.PERCEPTION, Role.OPTIMISATION, Role.LANDMARKS, Role.ANSWERS)
     single = [GRANTS[role] for role in all_of_them]
     assert GRANTS[Role.SERVICE] == Grant().joined(*single)
 

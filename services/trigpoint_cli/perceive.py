@@ -1,0 +1,52 @@
+"""`trigpoint perceive`: the landmarks and motions that lidar sweeps show."""
+
+import click
+
+from trigpoint.errors import InputError
+from trigpoint_cli.data_dir import DataDirectory, data_option
+from trigpoint_cli.output import Answer, JsonObject, Screen, answering, counted
+from trigpoint_perception.app import DriveReport, perceive_log
+
+
+@click.command("perceive")
+@data_option
+@answering
+def command(data: DataDirectory, *, screen: Screen) -> Answer:
+    """Search the sweeps of every drive that is not excluded for poles and building corners, and match them for
+    odometry; what was said already is not said again.
+
+    Sweeps that cannot be used are counted by reason, kept with it in the log, and end the command with status 2 after
+    everything else was done.
+    """
+    with data.opened_log() as log, screen.part_of("perceiving") as progress:
+        reports = perceive_log(log, progress=progress)
+    if not reports:
+        raise InputError(f"{data.log}: no drive has lidar sweeps, or all that have are excluded")
+    complaints = tuple(
+        f"{one.vehicle} {one.boot_id}: {counted(count, 'sweep')} refused: {reason}"
+        for one in reports
+        for reason, count in one.refused
+    )
+    values = {"drives": [_item(one) for one in reports], "appended": sum(one.appended for one in reports)}
+    return Answer(values, tuple(map(_line, reports)), complaints)
+
+
+def _item(one: DriveReport) -> JsonObject:
+    return {
+        "vehicle": one.vehicle,
+        "boot_id": one.boot_id,
+        "sweeps": one.sweeps,
+        "refused": dict(one.refused),
+        "matched": one.matched,
+        "sights": one.sights,
+        "poles": one.poles,
+        "corners": one.corners,
+        "appended": one.appended,
+    }
+
+
+def _line(one: DriveReport) -> str:
+    return (
+        f"{one.vehicle}: {counted(one.sweeps, 'sweep')}, {one.matched} matched; {counted(one.poles, 'pole')} and "
+        f"{counted(one.corners, 'corner')} seen {one.sights} times; {one.appended} events appended"
+    )

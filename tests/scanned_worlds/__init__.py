@@ -1,0 +1,1 @@
+"""Sweeps of a world of cylinders and walls, ray by ray."""
