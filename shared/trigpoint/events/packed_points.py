@@ -55,15 +55,15 @@ def unpacked_points(
     """
     rows = _rows(fields, data, stride)
     point_m = np.empty((len(rows), 3), dtype=np.float32)
-    for index, axis in enumerate(AXES):
-        with np.errstate(over="ignore"):  # what is too far for float32 is infinite, which nobody takes for a return
+    with np.errstate(over="ignore", invalid="ignore"):  # what is too far for float32 is infinite: no return
+        for index, axis in enumerate(AXES):
             point_m[:, index] = rows[axis]
-    return PackedPoints(
-        point_m=point_m,
-        intensity=_intensity(rows),
-        offset_ns=_offset_ns(rows, stamp_ns),
-        ring=_ring(rows),
-    )
+        return PackedPoints(
+            point_m=point_m,
+            intensity=_intensity(rows),
+            offset_ns=_offset_ns(rows, stamp_ns),
+            ring=_ring(rows),
+        )
 
 
 def _rows(fields: Sequence[PackedField], data: bytes, stride: int) -> NDArray[np.void]:
@@ -103,8 +103,7 @@ def _intensity(rows: NDArray[np.void]) -> NDArray[np.float32]:
     name = _first_of(rows, INTENSITIES)
     if name is None:
         return np.zeros(len(rows), dtype=np.float32)
-    with np.errstate(over="ignore"):
-        return np.ascontiguousarray(rows[name], dtype=np.float32)
+    return np.ascontiguousarray(rows[name], dtype=np.float32)
 
 
 def _ring(rows: NDArray[np.void]) -> NDArray[np.uint16]:
