@@ -18,6 +18,7 @@ from trigpoint.events.corrected import (
     DriveIncluded,
     excluded_drives,
 )
+from trigpoint.events.drives import DRIVE_KINDS
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.estimated import FixJudged
 from trigpoint.events.keys import DEFAULT_MAP, DEFAULT_ROOT, KEY_VERSION, STREAM_PATTERNS, key_of
@@ -129,7 +130,7 @@ class LiveOptimisation:
         self._fleet = LiveFleet(
             frame, self._settings, base=state.landmarks, starts=state.starts, excluded=self._excluded
         )
-        self._measured = StreamFollower(self._log, _is_vehicle, checkpoint=state.vehicle_numbers)
+        self._measured = StreamFollower(self._log, _is_vehicle, checkpoint=state.vehicle_numbers, kinds=DRIVE_KINDS)
         self._judged = StreamFollower(
             self._log, [VERDICT_STREAM], checkpoint={VERDICT_STREAM: state.verdict_number}, kinds=(FixJudged,)
         )

@@ -33,6 +33,7 @@ from trigpoint.events.observed import (
     WheelPairMeasured,
     WheelSpeedMeasured,
 )
+from trigpoint.events.scanned import PointsScanned
 
 T = TypeVar("T")
 
@@ -83,6 +84,7 @@ FLOWS: tuple[Flow, ...] = (
     Flow(ImuMeasured, INGEST, (FILTERING, OPTIMISATION, EVALUATION), sender=VEHICLE),
     Flow(GnssFixReceived, INGEST, (FILTERING, OPTIMISATION, EVALUATION), sender=VEHICLE),
     Flow(LandmarksDetected, INGEST, (OPTIMISATION, LANDMARKS, EVALUATION), sender=VEHICLE),
+    Flow(PointsScanned, INGEST, (), sender=VEHICLE),
     Flow(EventRefused, INGEST, (EVALUATION,)),
     Flow(MapFramePinned, INGEST, (FILTERING, OPTIMISATION, LANDMARKS, EVALUATION)),
     Flow(AnchorLabelled, INGEST, (OPTIMISATION, LANDMARKS, EVALUATION)),

@@ -12,7 +12,7 @@ import pytest
 from trigpoint import dataflow
 from trigpoint.bus import access
 from trigpoint.bus.key_expressions import key_matches
-from trigpoint.events import corrected, estimated, keys, mapped, observed
+from trigpoint.events import corrected, estimated, keys, mapped, observed, scanned
 from trigpoint_schemas.v1 import asked_pb2
 
 REPOSITORY = Path(__file__).parents[2]
@@ -59,7 +59,7 @@ def test_a_stream_has_one_writer() -> None:
 
 
 def test_every_event_class_is_in_the_table() -> None:
-    classes = set().union(*(events_of(module) for module in (observed, corrected, estimated, mapped)))
+    classes = set().union(*(events_of(module) for module in (observed, scanned, corrected, estimated, mapped)))
     assert classes == {flow.event for flow in dataflow.FLOWS}
 
 

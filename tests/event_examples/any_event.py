@@ -31,6 +31,7 @@ from trigpoint.events.observed import (
     WheelPairMeasured,
     WheelSpeedMeasured,
 )
+from trigpoint.events.scanned import PointsScanned
 
 any_float = st.floats()
 any_text = st.text(max_size=20)
@@ -77,6 +78,19 @@ def _trajectory(count: int) -> SearchStrategy[object]:
     )
 
 
+def _sweep(count: int) -> SearchStrategy[object]:
+    return st.builds(
+        PointsScanned,
+        sensor=any_text,
+        sensor_position_m=_array(3),
+        sensor_orientation=_array(4),
+        point_m=arrays(np.float32, (count, 3), elements=st.floats(width=32)),
+        intensity=arrays(np.float32, count, elements=st.floats(width=32)),
+        offset_ns=arrays(np.int32, count),
+        ring=arrays(np.uint16, count),
+    )
+
+
 _detection = st.builds(
     LandmarkDetection,
     range_m=any_float,
@@ -92,6 +106,7 @@ ANY_EVENT: dict[type, SearchStrategy[object]] = {
         GnssFixReceived, lat_deg=any_float, lon_deg=any_float, height_m=any_float, sigma_m=any_sigma_m
     ),
     LandmarksDetected: st.builds(LandmarksDetected, detections=st.lists(_detection, max_size=4).map(tuple)),
+    PointsScanned: st.integers(0, 4).flatmap(_sweep),
     EventRefused: st.builds(
         EventRefused,
         source=any_text,

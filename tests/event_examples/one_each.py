@@ -28,6 +28,7 @@ from trigpoint.events.observed import (
     WheelPairMeasured,
     WheelSpeedMeasured,
 )
+from trigpoint.events.scanned import PointsScanned
 
 EVENTS: tuple[Event, ...] = (
     VehicleDescribed(
@@ -47,6 +48,15 @@ EVENTS: tuple[Event, ...] = (
             LandmarkDetection(12.5, -0.4, "tree", "", 0.31),
             LandmarkDetection(3.25, 1.5, "vehicle", "car", math.nan),
         )
+    ),
+    PointsScanned(
+        sensor="roof",
+        sensor_position_m=np.array([0.4, -0.1, 1.9]),
+        sensor_orientation=np.array([0.0, 0.0, 0.6, 0.8]),
+        point_m=np.array([[4.0, 0.5, -1.9], [math.nan, math.nan, math.nan]], dtype=np.float32),
+        intensity=np.array([17.0, 0.0], dtype=np.float32),
+        offset_ns=np.array([-50_000_000, 49_950_000], dtype=np.int32),
+        ring=np.array([0, 15], dtype=np.uint16),
     ),
     EventRefused(
         source="van", reason="not finite", detail="lat_deg nan", schema_name="x.Y", payload=b"\x00\xff\x89MCAP"

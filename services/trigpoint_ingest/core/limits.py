@@ -16,8 +16,10 @@ from trigpoint.events.observed import (
     WheelPairMeasured,
     WheelSpeedMeasured,
 )
+from trigpoint.events.scanned import PointsScanned
 from trigpoint.geodesy.poses import wrap_angle_rad
 from trigpoint_ingest.core.framing import frame_of_description
+from trigpoint_ingest.core.sweep_limits import sweep_within_limits
 
 LATITUDE_LIMIT_DEG = 90.0
 LONGITUDE_LIMIT_DEG = 180.0
@@ -87,6 +89,7 @@ LIMITS: Mapping[type, tuple[FieldLimit, ...]] = {
         FieldLimit("sigma_m", SIGMA_SMALLEST_M, SIGMA_LARGEST_M, or_nan=True),
     ),
     LandmarksDetected: (),
+    PointsScanned: (),
     LandmarkDetection: (
         FieldLimit("range_m", 0.0, RANGE_LIMIT_M),
         _within("bearing_rad", BEARING_LIMIT_RAD),
@@ -96,13 +99,16 @@ LIMITS: Mapping[type, tuple[FieldLimit, ...]] = {
 
 
 def within_limits(event: Observed) -> Observed:
-    """The event itself, bearings wrapped into [-pi, pi).
+    """The event itself, bearings wrapped into [-pi, pi), infinite points NaN.
 
-    Raises EventRejected with reason "not finite", "out of range" or "unknown crs".
+    Raises EventRejected with reason "not finite", "out of range" or "unknown crs", or as `sweep_within_limits` does.
     """
     _require_fields(event)
     if type(event) is LandmarksDetected:
-        return _sweep_within_limits(event)
+        return _detections_within_limits(event)
+    if type(event) is PointsScanned:
+        _require_texts(sensor=event.sensor)
+        return sweep_within_limits(event)
     if type(event) is VehicleDescribed:
         _require_description(event)
     if type(event) is GnssFixReceived and event.lat_deg == 0.0 and event.lon_deg == 0.0:
@@ -129,7 +135,7 @@ def _refusal(event: Observed | LandmarkDetection, limit: FieldLimit, value: floa
     return EventRejected(OUT_OF_RANGE, f"{name} {value:.9g} is outside {limit.lowest:.9g} to {limit.highest:.9g}")
 
 
-def _sweep_within_limits(sweep: LandmarksDetected) -> LandmarksDetected:
+def _detections_within_limits(sweep: LandmarksDetected) -> LandmarksDetected:
     if len(sweep.detections) > DETECTIONS_LIMIT:
         raise EventRejected(OUT_OF_RANGE, f"{len(sweep.detections)} detections in a sweep, limit {DETECTIONS_LIMIT}")
     wrapped = False

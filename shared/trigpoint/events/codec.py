@@ -1,6 +1,7 @@
 """The wire form of events: Protobuf payloads and the names of their schemas.
 
-A GNSS fix is a foxglove.LocationFix, every other event the message of its own name in package trigpoint.v1.
+A GNSS fix is a foxglove.LocationFix, a sweep of points a foxglove.PointCloud, every other event the message of
+its own name in package trigpoint.v1.
 Identity and time of measurement are not part of a payload: whatever carries it carries them.
 """
 

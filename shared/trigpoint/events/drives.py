@@ -17,6 +17,16 @@ from trigpoint.events.observed import (
     WheelSpeedMeasured,
 )
 
+DRIVE_KINDS: tuple[type, ...] = (
+    VehicleDescribed,
+    WheelSpeedMeasured,
+    WheelPairMeasured,
+    ImuMeasured,
+    GnssFixReceived,
+    LandmarksDetected,
+)
+"""The classes of events a drive is folded from; points are not among them."""
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -154,10 +164,13 @@ def _detection_series(rows: list[Envelope[LandmarksDetected]]) -> DetectionSerie
 def drives_of(events: Iterable[Envelope[Observed]]) -> tuple[Drive, ...]:
     """One Drive for each (vehicle, boot) in the events, in order of vehicle and first stamp.
 
-    Events may come in any order between kinds; a drive without VehicleDescribed gets an all-zero one.
+    Events may come in any order between kinds, those of other classes than DRIVE_KINDS are passed over; a drive
+    without VehicleDescribed gets an all-zero one.
     """
     by_drive: dict[tuple[str, str], dict[type, list[Envelope[Observed]]]] = {}
     for row in events:
+        if not isinstance(row.event, DRIVE_KINDS):
+            continue
         kinds = by_drive.setdefault((row.identity.source, row.identity.boot_id), {})
         kinds.setdefault(type(row.event), []).append(row)
     drives = [_drive(vehicle, boot_id, kinds) for (vehicle, boot_id), kinds in by_drive.items()]

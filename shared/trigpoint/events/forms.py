@@ -8,10 +8,12 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
+from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from google.protobuf.message import Message
 from numpy.typing import NDArray
 
 from trigpoint.errors import EventRejected
+from trigpoint.events.cloud_forms import cloud_event, cloud_message
 from trigpoint.events.corrected import AnchorLabelled, AnchorRetracted, DriveExcluded, DriveIncluded
 from trigpoint.events.estimated import FixJudged, GateAlarmed, PoseFiltered
 from trigpoint.events.mapped import (
@@ -34,6 +36,7 @@ from trigpoint.events.observed import (
     WheelPairMeasured,
     WheelSpeedMeasured,
 )
+from trigpoint.events.scanned import PointsScanned
 from trigpoint_schemas.v1 import corrected_pb2, estimated_pb2, mapped_pb2, observed_pb2
 
 EventT = TypeVar("EventT")
@@ -348,6 +351,7 @@ FORMS: tuple[Form[Any, Any], ...] = (
     replace(_flat(ImuMeasured, observed_pb2.ImuMeasured), event_of=_imu_event),
     Form(GnssFixReceived, LocationFix, _fix_message, _fix_event),
     Form(LandmarksDetected, observed_pb2.LandmarksDetected, _sweep_message, _sweep_event),
+    Form(PointsScanned, PointCloud, cloud_message, cloud_event),
     _flat(EventRefused, observed_pb2.EventRefused),
     _flat(MapFramePinned, observed_pb2.MapFramePinned),
     _flat(AnchorLabelled, corrected_pb2.AnchorLabelled),

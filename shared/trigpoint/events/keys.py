@@ -27,6 +27,7 @@ from trigpoint.events.observed import (
     WheelPairMeasured,
     WheelSpeedMeasured,
 )
+from trigpoint.events.scanned import PointsScanned
 from trigpoint.geodesy.positions import MapPosition
 from trigpoint.geodesy.web_tiles import tile_at
 
@@ -47,6 +48,7 @@ KEY_PATTERNS: Mapping[type, str] = {
     ImuMeasured: "veh/{vehicle}/obs/imu",
     GnssFixReceived: "veh/{vehicle}/obs/gnss",
     LandmarksDetected: "veh/{vehicle}/obs/landmarks",
+    PointsScanned: "veh/{vehicle}/obs/points",
     EventRefused: "refused",
     MapFramePinned: "map/{map}/frame",
     AnchorLabelled: "map/{map}/anchor",
@@ -76,6 +78,7 @@ STREAM_PATTERNS: Mapping[type, str] = {
     ImuMeasured: "veh-{vehicle}",
     GnssFixReceived: "veh-{vehicle}",
     LandmarksDetected: "veh-{vehicle}",
+    PointsScanned: "veh-{vehicle}",
     EventRefused: "refused",
     MapFramePinned: "map",
     AnchorLabelled: "corrections",

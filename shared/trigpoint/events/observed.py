@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from trigpoint.events.scanned import PointsScanned
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleDescribed:
@@ -95,7 +97,15 @@ class LandmarksDetected:
     detections: tuple[LandmarkDetection, ...]
 
 
-Observed = VehicleDescribed | WheelSpeedMeasured | WheelPairMeasured | ImuMeasured | GnssFixReceived | LandmarksDetected
+Observed = (
+    VehicleDescribed
+    | WheelSpeedMeasured
+    | WheelPairMeasured
+    | ImuMeasured
+    | GnssFixReceived
+    | LandmarksDetected
+    | PointsScanned
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

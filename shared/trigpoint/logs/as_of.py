@@ -67,7 +67,7 @@ class LogAsOf:
 
     def boots(self, stream: str) -> tuple[LoggedBoot, ...]:
         """The boots of a stream that had any event then; times as they are now."""
-        known = {(row.envelope.identity.source, row.envelope.identity.boot_id) for row in self.read(stream)}
+        known = {(row.run.source, row.run.boot_id) for row in self.read_runs(stream)}
         return tuple(boot for boot in self._log.boots(stream) if (boot.source, boot.boot_id) in known)
 
     def close(self) -> None:

@@ -197,6 +197,8 @@ class McapLog:
             path = file_path(self.directory / stream, first)
             with opened(path, chunks) as file:
                 for chunk in chunks:
+                    if channels.keys().isdisjoint(chunk.channel_ids):
+                        continue
                     data = chunk_data(file, path, chunk)
                     yield chunk, data, file.read(index_bytes(chunk.count, len(chunk.channel_ids))), channels
 

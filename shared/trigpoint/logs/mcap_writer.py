@@ -235,12 +235,16 @@ class McapFileWriter:
 
 
 def _groups_of_rows(rows: PackedRows) -> Iterator[PackedRows]:
-    """The rows cut into runs of about CHUNK_BYTES of payload."""
+    """The rows cut into runs of about CHUNK_BYTES of payload; a larger one is alone, so that who wants the others need
+    not unpack it."""
     if 0 < sum(map(len, rows.payloads)) < CHUNK_BYTES:
         yield rows
         return
     start, size = 0, 0
     for index, payload in enumerate(rows.payloads):
+        if size and len(payload) >= CHUNK_BYTES:
+            yield rows.part(start, index)
+            start, size = index, 0
         size += len(payload)
         if size >= CHUNK_BYTES:
             yield rows.part(start, index + 1)

@@ -5,7 +5,7 @@ from typing import cast
 
 from trigpoint.errors import InputError
 from trigpoint.events.corrected import AnchorLabelled, Corrected, anchors_in_force, excluded_drives
-from trigpoint.events.drives import Drive, drives_of
+from trigpoint.events.drives import DRIVE_KINDS, Drive, drives_of
 from trigpoint.events.envelope import Envelope
 from trigpoint.events.estimated import FixJudged
 from trigpoint.events.keys import STREAM_PATTERNS
@@ -55,7 +55,7 @@ def drives_of_vehicle(log: EventLog, vehicle: str) -> tuple[Drive, ...]:
     if f"{VEHICLE_PREFIX}{vehicle}" not in streams:
         known = ", ".join(stream.removeprefix(VEHICLE_PREFIX) for stream in streams) or "none"
         raise InputError(f"vehicle {vehicle!r} has no drive in the log; these have: {known}")
-    rows = log.read(f"{VEHICLE_PREFIX}{vehicle}")
+    rows = log.read(f"{VEHICLE_PREFIX}{vehicle}", kinds=DRIVE_KINDS)
     return drives_of([cast(Envelope[Observed], row.envelope) for row in rows])
 
 
@@ -64,17 +64,24 @@ def logged_drives(log: EventLog, *, progress: Progress = in_silence) -> tuple[Dr
     streams, excluded = vehicle_streams(log), excluded_drives(logged_corrections(log))
     total = sum(log.next_number(stream) for stream in streams)
     rows: list[Envelope[Observed]] = []
-    for done, logged in enumerate((row for stream in streams for row in log.read(stream)), start=1):
+    for done, logged in enumerate((row for stream in streams for row in log.read(stream, kinds=DRIVE_KINDS)), start=1):
         identity = logged.envelope.identity
         if (identity.source, identity.boot_id) not in excluded:
             rows.append(cast(Envelope[Observed], logged.envelope))
         if done % PROGRESS_COUNT == 0:
             progress(done, total)
     if not rows:
-        without = f"all of the log's {len(excluded)} drives are excluded; `trigpoint drives include` takes one back"
-        raise InputError(without if total else "the log holds no vehicle's events: nothing was ingested yet")
+        raise InputError(_without_drive(total, len(excluded)))
     progress(total, total)
     return drives_of(rows)
+
+
+def _without_drive(total: int, excluded: int) -> str:
+    if not total:
+        return "the log holds no vehicle's events: nothing was ingested yet"
+    if excluded:
+        return f"all of the log's {excluded} drives are excluded; `trigpoint drives include` takes one back"
+    return f"none of the log's {total} events of vehicles tells of a path: points alone make no drive"
 
 
 def logged_corrections(log: EventLog) -> tuple[Corrected, ...]:
