@@ -100,3 +100,11 @@ class LidarSettings:
     return_scatter: float = 0.3  # 1-sigma of the return's natural logarithm
     intensity_scatter: float = 0.08  # 1-sigma, as a share
     dropout: float = 0.01  # of all returns, for no reason
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CarriedLidar:
+    """The lidar every vehicle carries, and the world it looks at."""
+
+    scene: SceneSettings = field(default_factory=SceneSettings)
+    lidar: LidarSettings = field(default_factory=LidarSettings)

@@ -1,13 +1,14 @@
 """One drive's events put in order of time and numbered, as a vehicle would have sent them."""
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from trigpoint.events.corrected import AnchorLabelled
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.observed import Observed, VehicleDescribed
 from trigpoint.events.truth import Truth
+from trigpoint.events.truth_objects import TruthObject
 
 Timed = tuple[int, Observed]
 BOOT_ID_DIGITS = 16  # 64 bits of SHA-256: enough to tell drives apart
@@ -18,17 +19,19 @@ class Recording:
     """Everything one vehicle said in one boot, numbered from 0 in order of stamp."""
 
     vehicle: str
-    rows: tuple[Envelope[Observed], ...]
+    rows: Sequence[Envelope[Observed]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Conversion:
-    """What a source holds: recordings, and kept apart from them truth and anchors; `remarks` for a person to read."""
+    """What a source holds: recordings, and kept apart from them truth, a simulated world's objects, and anchors;
+    `remarks` for a person to read."""
 
     recordings: tuple[Recording, ...]
     truth: Truth
     anchors: tuple[AnchorLabelled, ...]
     remarks: tuple[str, ...] = ()
+    objects: tuple[TruthObject, ...] = ()
 
 
 def boot_id_of(*parts: bytes) -> str:

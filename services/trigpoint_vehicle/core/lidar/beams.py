@@ -31,7 +31,7 @@ class Shots:
 def shots_of(settings: LidarSettings) -> Shots:
     """The shots of a turn that begins looking back and goes clockwise, so that what is ahead comes in the middle."""
     turn_s = 1.0 / settings.rate_hz
-    column_s = np.arange(settings.columns) * (turn_s / settings.columns)
+    column_s = (np.arange(settings.columns) * (turn_s / settings.columns)).astype(np.float64)
     offset_ns = np.rint(column_s[:, None] * 1e9).astype(np.int64) + FIRING_STEP_NS * np.arange(BEAMS)
     azimuth = np.pi - 2.0 * np.pi * (offset_ns * 1e-9 / turn_s)
     elevation = np.radians(FIRING_ELEVATION_DEG)

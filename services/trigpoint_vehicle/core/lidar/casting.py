@@ -3,12 +3,20 @@
 import math
 from typing import NamedTuple
 
-
 import numpy as np
 from numpy.typing import NDArray
 
 from trigpoint_vehicle.core.compiled import compiled
-from trigpoint_vehicle.core.lidar.hits import GROUND_REACH_M, Foot, Hit, Ray, box_hit, crown_hit, cylinder_hit, ground_hit
+from trigpoint_vehicle.core.lidar.hits import (
+    GROUND_REACH_M,
+    Foot,
+    Hit,
+    Ray,
+    box_hit,
+    crown_hit,
+    cylinder_hit,
+    ground_hit,
+)
 from trigpoint_vehicle.core.lidar.solids import CROWN, CYLINDER, Solids
 from trigpoint_vehicle.core.scene.ground import Ground, streets_near, terrain
 
@@ -252,7 +260,7 @@ def _strength(view: _View, solid: int, hit: tuple[float, float, int]) -> float:
     if solid >= 0 and view.world.solids.shape[solid] == CYLINDER:
         filled = min(1.0, 2.0 * view.world.solids.size[solid, 0] / (optics.divergence_rad * hit[0]))
     share = optics.range_max_m / hit[0]
-    return view.world.reflectivity[hit[2]] * hit[1] * filled * share * share
+    return float(view.world.reflectivity[hit[2]] * hit[1] * filled * share * share)
 
 
 @compiled

@@ -1,6 +1,5 @@
 """The sweeps of one drive, cast a few at a time as they are asked for: a whole drive's points fit no memory."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,8 +7,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from trigpoint.events.scanned import PointsScanned
-from trigpoint_vehicle.core.lidar.beams import BEAMS, Shots, shots_of
-from trigpoint_vehicle.core.lidar.casting import Optics, Taken, World, cast_sweeps
+from trigpoint_vehicle.core.lidar.beams import Shots, shots_of
+from trigpoint_vehicle.core.lidar.casting import Optics, Taken, World, cast_sweeps, sensor_poses
 from trigpoint_vehicle.core.lidar.solids import NamedSolids, mover_states
 from trigpoint_vehicle.core.lidar_settings import LidarSettings
 from trigpoint_vehicle.core.motion import Motion
@@ -19,7 +18,8 @@ from trigpoint_vehicle.core.scene.world import Scene, Session
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-SWEEPS_AT_ONCE = 32  # some 20 MB
+SWEEPS_AT_ONCE = 16  # half a second of one core's work, some 10 MB
+NOISE = 107  # the stream of noise, after those of `scene.world`
 
 
 def optics_of(settings: LidarSettings, shots: Shots) -> Optics:
@@ -44,7 +44,7 @@ def optics_of(settings: LidarSettings, shots: Shots) -> Optics:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveScans:
-    """All sweeps of a drive through one session of a scene; `seed` is that of the sensor's noise.
+    """All sweeps of drive `number` through its session of a scene; with `seed` it says which noise the sensor has.
 
     Sweeps begin at the motion's multiples of the turn's duration; the last is whole.
     """
@@ -56,6 +56,7 @@ class DriveScans:
     settings: LidarSettings
     first_stamp_ns: int
     seed: int
+    number: int = 0
 
     def begin_s(self) -> Floats:
         """When each sweep (s,) begins, by the motion's time."""
@@ -75,15 +76,20 @@ class DriveScans:
 
     def taken(self, first: int, last: int) -> Taken:
         """What came back in the sweeps from `first` to before `last`."""
-        shots = shots_of(self.settings)
-        begin_s = self.begin_s()[first:last]
+        shots, begin_s = shots_of(self.settings), self.begin_s()[first:last]
         world = World(self.scene.ground, self.solids.solids, reflectivities(), intensities())
-        seeds = np.random.SeedSequence([self.seed]).generate_state(1, np.uint64) + np.arange(
-            first, first + len(begin_s), dtype=np.uint64
-        ) * np.uint64(BEAMS * self.settings.columns)
         base = self.base_poses(begin_s[:, None] + shots.column_s)
         movers = mover_states(self.scene, self.session, begin_s)
-        return cast_sweeps(world, optics_of(self.settings, shots), base, movers, seeds)
+        return cast_sweeps(world, optics_of(self.settings, shots), base, movers, self._noise_seeds()[first:last])
+
+    def sensor_poses(self, time_s: Floats) -> tuple[Floats, Floats]:
+        """The sensor's true places (n, 3) and axes (n, 3, 3) in the world at times (n,), in m over the ground."""
+        shots = shots_of(self.settings)
+        return sensor_poses(self.scene.ground.wave, optics_of(self.settings, shots), self.base_poses(time_s))
+
+    def _noise_seeds(self) -> NDArray[np.uint64]:
+        words = np.random.SeedSequence([self.seed, NOISE, self.number]).generate_state(len(self), np.uint64)
+        return words.astype(np.uint64)
 
     def events(self, first: int, last: int) -> list[PointsScanned]:
         """The sweeps from `first` to before `last` as the sensor says them: what did not come back is left out."""
@@ -92,10 +98,6 @@ class DriveScans:
 
     def __len__(self) -> int:
         return len(self.begin_s())
-
-    def __iter__(self) -> Iterator[PointsScanned]:
-        for first in range(0, len(self), SWEEPS_AT_ONCE):
-            yield from self.events(first, first + SWEEPS_AT_ONCE)
 
     def _event(self, shots: Shots, range_m: NDArray[np.float32], told: NDArray[np.float32]) -> PointsScanned:
         settings, back = self.settings, np.isfinite(range_m)

@@ -45,9 +45,7 @@ class NamedSolids:
     solids: Solids
 
 
-def _rows(
-    shape: int, material: Material, foot_m: Floats, size_m: Floats, *, facing: Floats | None = None
-) -> Solids:
+def _rows(shape: int, material: Material, foot_m: Floats, size_m: Floats, *, facing: Floats | None = None) -> Solids:
     count = len(foot_m)
     ahead = np.tile([1.0, 0.0], (count, 1)) if facing is None else np.column_stack([np.cos(facing), np.sin(facing)])
     return Solids(

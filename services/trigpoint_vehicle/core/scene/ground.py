@@ -26,8 +26,9 @@ ASPHALT, PAINT, KERB, GRASS = (int(m) for m in (Material.ASPHALT, Material.PAINT
 
 
 class Ground(NamedTuple):
-    """wave (w, 5): amplitude, wave numbers along x and y, phase and steepest slope of each wave of the terrain; street (m, 4): x and y of
-    begin and end of each carriageway's middle; stripe (k, 6): the markings every street has (`markings.STRIPES`)."""
+    """wave (w, 5): amplitude, wave numbers along x and y, phase and steepest slope of each wave of the terrain;
+    street (m, 4): x and y of begin and end of each carriageway's middle; stripe (k, 6): the markings every street has
+    (`markings.STRIPES`)."""
 
     wave: Floats
     street: Floats
@@ -43,7 +44,9 @@ def laid_ground(
     towards, phase = rng.uniform(0.0, 2.0 * np.pi, (2, count))
     amplitude = np.full(count, settings.wave_height_m)
     return Ground(
-        wave=np.column_stack([amplitude, number * np.cos(towards), number * np.sin(towards), phase, amplitude * number]),
+        wave=np.column_stack(
+            [amplitude, number * np.cos(towards), number * np.sin(towards), phase, amplitude * number]
+        ),
         street=streets.junction_m[streets.street].reshape(-1, 4) / scale,
         stripe=stripe,
     )
@@ -90,7 +93,7 @@ def _on_stripe(stripe: Floats, number: int, along_m: float, left_m: float, lengt
     first = stripe[number, 0] if stripe[number, 0] >= 0.0 else length_m + stripe[number, 0]
     last = stripe[number, 1] if stripe[number, 1] >= 0.0 else length_m + stripe[number, 1]
     within = first <= along_m <= last and stripe[number, 4] <= left_m <= stripe[number, 5]
-    return within and (along_m - first) % stripe[number, 2] < stripe[number, 3]
+    return bool(within and (along_m - first) % stripe[number, 2] < stripe[number, 3])
 
 
 @compiled

@@ -40,7 +40,9 @@ REFLECTIVITY: dict[Material, float] = {
     Material.CAR: 0.35,
     Material.PERSON: 0.35,
 }
-DIFFUSE_INTENSITY = 100.0  # of reflectivity 1, in the sensor's unit of 0 to 255 (VLP-16 manual, calibrated reflectivity)
+DIFFUSE_INTENSITY = (
+    100.0  # of reflectivity 1, in the sensor's unit of 0 to 255 (VLP-16 manual, calibrated reflectivity)
+)
 RETRO_INTENSITY = 200.0
 
 

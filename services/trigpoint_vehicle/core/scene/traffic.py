@@ -110,9 +110,7 @@ def parking_places(
     clear &= _outside(place_m, standing.footprint, PARKED_BUILDING_M)
     place_m, facing_rad = place_m[clear], np.arctan2(ahead[clear, 1], ahead[clear, 0])
     chosen = spread_out(place_m, count=settings.parking_count, distance_m=PARKED_APART_M)
-    return Parking(
-        place_m=place_m[chosen], facing_rad=facing_rad[chosen], size=rng.uniform(0.92, 1.08, len(chosen))
-    )
+    return Parking(place_m=place_m[chosen], facing_rad=facing_rad[chosen], size=rng.uniform(0.92, 1.08, len(chosen)))
 
 
 def _cars(streets: Streets, settings: TrafficSettings, rng: np.random.Generator) -> Movers:
