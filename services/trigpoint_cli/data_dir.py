@@ -54,6 +54,11 @@ class DataDirectory:
         return self.path / "truth" / "truth.csv"
 
     @property
+    def objects(self) -> Path:
+        """What stands in a simulated world that a lidar looks at."""
+        return self.path / "truth" / "objects.csv"
+
+    @property
     def aerial(self) -> Path:
         """A simulation's aerial pictures, a folder of tiles each."""
         return self.path / "aerial"

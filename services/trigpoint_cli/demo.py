@@ -4,6 +4,7 @@ import os
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -42,15 +43,17 @@ class _Driven:
 @click.option("--vehicles", type=int, default=2, show_default=True, metavar="N", help="How many drive there.")
 @click.option("--known-signatures", is_flag=True, help="Detections and labels say which landmark they are of.")
 @click.option("--aerial", is_flag=True, help=f"Aerial pictures of it too, and DIR/{VIEWER}, which shows them.")
+@click.option("--lidar", is_flag=True, help="Vehicles carry a lidar: some 300 MB of points a kilometre.")
+@click.option("--points-only", is_flag=True, help="With --lidar: no simulated detections, points only.")
 @answering
-def command(out: Path, seed: int, vehicles: int, known_signatures: bool, aerial: bool, *, screen: Screen) -> Answer:
+def command(out: Path, *, aerial: bool, screen: Screen, **simulated: Any) -> Answer:
     """Simulate a campus and take it all the way to a map, a report and its errors.
 
     The vehicles' messages travel over Zenoh. DIR is a data directory afterwards: every other command works on it.
     """
-    settings = SimulationSettings(seed=seed, vehicles=vehicles, known_signatures=known_signatures)
+    settings = SimulationSettings(**simulated)
     data = _emptied(out)
-    screen.note(f"simulating campus {seed} with {vehicles} vehicles")
+    screen.note(f"simulating campus {settings.seed} with {settings.vehicles} vehicles")
     logs = _simulated(settings, data, aerial=aerial)
     with data.new_log() as log:
         with screen.counting("driving, over Zenoh", unit="messages") as progress:
@@ -110,5 +113,7 @@ def _simulated(settings: SimulationSettings, data: DataDirectory, *, aerial: boo
         raise InputError(f"seed {settings.seed}: the simulation left no truth or no anchors")
     data.truth.parent.mkdir(parents=True, exist_ok=True)
     written.truth.replace(data.truth)
+    if written.objects is not None:
+        written.objects.replace(data.objects)
     written.anchors.replace(data.anchors)
     return written.logs

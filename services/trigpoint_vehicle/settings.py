@@ -1,33 +1,45 @@
 """What the vehicle service may be told."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from trigpoint.errors import InputError
 from trigpoint.events.keys import DEFAULT_ROOT
 from trigpoint_vehicle.core.campus_settings import CampusSettings, with_known_signatures
+from trigpoint_vehicle.core.lidar_settings import CarriedLidar
 
 VEHICLES_MAX = 50  # every one is driven and kept in memory at once: about 100 MB each
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulationSettings:
-    """Which campus to simulate and how many vehicles drive there. Raises InputError outside the limits."""
+    """Which campus to simulate and how many vehicles drive there, with a lidar or without, and with points only: no
+    simulated detections. Raises InputError outside the limits."""
 
     seed: int = 1
     vehicles: int = 2
     known_signatures: bool = False
+    lidar: bool = False
+    points_only: bool = False
 
     def __post_init__(self) -> None:
         if self.seed < 0:
             raise InputError(f"seed {self.seed}: seeds begin at 0")
         if not 1 <= self.vehicles <= VEHICLES_MAX:
             raise InputError(f"{self.vehicles} vehicles: between 1 and {VEHICLES_MAX} can be simulated")
+        if self.points_only and not self.lidar:
+            raise InputError("points only: only vehicles with a lidar have points")
 
     def campus(self) -> CampusSettings:
         """The campus's settings."""
         settings = CampusSettings(vehicles=self.vehicles)
+        if self.points_only:
+            settings = replace(settings, carried=replace(settings.carried, landmarks=False))
         return with_known_signatures(settings) if self.known_signatures else settings
+
+    def carried_lidar(self) -> CarriedLidar | None:
+        """The lidar on every vehicle, None where they carry none."""
+        return CarriedLidar() if self.lidar else None
 
 
 SEGMENTS_MIN = 8  # of a full spool: what is dropped goes segment by segment, and two of them are in use

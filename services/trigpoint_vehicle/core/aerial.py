@@ -11,8 +11,14 @@ from trigpoint.geodesy.projection import wgs84_from_map_points
 from trigpoint.geodesy.web_tiles import WebTile, tile_coordinates, tile_size_m
 from trigpoint_vehicle.core.campus import Campus
 from trigpoint_vehicle.core.campus_settings import CampusSettings
+from trigpoint_vehicle.core.scene.buildings import away_from_street, footprint_m
+from trigpoint_vehicle.core.scene.furniture import Trees
+from trigpoint_vehicle.core.scene.ground import KERB_WIDTH_M
+from trigpoint_vehicle.core.scene.markings import marking_corners_m
+from trigpoint_vehicle.core.scene.world import Scene
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 Colour = tuple[int, int, int, int]
 
 ZOOM_MOST, ZOOM_LEAST = 20, 14  # 0.12 m a pixel at Sydney, and the whole campus in a tile or two
@@ -24,6 +30,9 @@ ASPHALT: Colour = (92, 92, 96, 255)
 ROOF: Colour = (164, 140, 122, 255)
 SHADE: Colour = (58, 68, 48, 255)
 POLE: Colour = (240, 240, 232, 255)
+WHITE: Colour = (226, 226, 220, 255)
+KERB_STONE: Colour = (150, 150, 146, 255)
+CROWN: Colour = (70, 96, 58, 255)
 MOTTLE = 10.0  # 1-sigma of the ground's brightness, of 255
 MOTTLE_PIXELS = 16  # its patches' size
 
@@ -46,21 +55,30 @@ class AerialPicture:
             canvas, column, row = _halved(canvas, column, row)
 
 
-def aerial_pictures(campus: Campus, settings: CampusSettings, *, seed: int) -> Iterator[AerialPicture]:
-    """The picture of each image, one after the other: they are large."""
+def aerial_pictures(
+    campus: Campus, settings: CampusSettings, *, seed: int, scene: Scene | None = None
+) -> Iterator[AerialPicture]:
+    """The picture of each image, one after the other: they are large.
+
+    With the scene a lidar looks at they show the same: its buildings, markings, kerbs and trees.
+    """
     for number, image in enumerate(campus.imagery.image):
-        row, column = divmod(number, settings.imagery.columns)
-        yield _Drawing(campus, settings, number, np.array([column, row])).picture(image, np.random.default_rng(seed))
+        cell = np.array(divmod(number, settings.imagery.columns)[::-1])
+        drawing = _Drawing(campus, settings, number, cell, scene=scene)
+        yield drawing.picture(image, np.random.default_rng(seed))
 
 
 class _Drawing:
     """One picture as it is drawn: the world shifted by the image's offset, on a canvas of whole tiles."""
 
-    def __init__(self, campus: Campus, settings: CampusSettings, number: int, cell: Floats) -> None:
-        self._campus, self._shift_m = campus, campus.imagery.offset_m[number]
+    def __init__(
+        self, campus: Campus, settings: CampusSettings, number: int, cell: Ints, *, scene: Scene | None
+    ) -> None:
+        self._campus, self._scene, self._shift_m = campus, scene, campus.imagery.offset_m[number]
         extent_m = np.array([settings.streets.width_m, settings.streets.height_m])
         side_m = extent_m / (settings.imagery.columns, settings.imagery.rows)
         low_m, high_m = cell * side_m - AROUND_M, (cell + 1) * side_m + AROUND_M
+        self._middle = 0.0 if scene is None else 0.5
         self._ground_m = np.array([low_m, (high_m[0], low_m[1]), high_m, (low_m[0], high_m[1])])
         corners = self._world_pixels(self._ground_m)
         self._first = np.floor(corners.min(axis=0) / TILE_PIXELS).astype(int)
@@ -72,7 +90,11 @@ class _Drawing:
         """The picture drawn."""
         canvas = self._grass(random)
         draw = ImageDraw.Draw(canvas)
-        self._draw_streets(draw)
+        if self._scene is not None:
+            self._draw_carriageways(draw, KERB_STONE, STREET_M + 2.0 * KERB_WIDTH_M)
+        self._draw_carriageways(draw, ASPHALT, STREET_M)
+        if self._scene is not None:
+            self._draw_markings(draw, self._scene)
         self._draw_landmarks(draw)
         ground = Image.new("L", canvas.size, 0)
         ImageDraw.Draw(ground).polygon(self._pixels(self._ground_m), fill=255)
@@ -89,22 +111,34 @@ class _Drawing:
         width, height = self._size.tolist()
         return Image.fromarray(colours).resize((width, height), Image.Resampling.BICUBIC).convert("RGBA")
 
-    def _draw_streets(self, draw: ImageDraw.ImageDraw) -> None:
-        streets, width = self._campus.streets, round(STREET_M * self._pixels_per_m)
+    def _draw_carriageways(self, draw: ImageDraw.ImageDraw, colour: Colour, width_m: float) -> None:
+        streets, width = self._campus.streets, round(width_m * self._pixels_per_m)
         for begin, end in streets.street:
             line = self._pixels(streets.junction_m[[begin, end]] + self._shift_m)
-            draw.line(line, fill=ASPHALT, width=width)
+            draw.line(line, fill=colour, width=width)
             for x, y in line:
-                draw.ellipse(_around(x, y, width / 2), fill=ASPHALT)
+                draw.ellipse(_around(x, y, width / 2), fill=colour)
+
+    def _draw_markings(self, draw: ImageDraw.ImageDraw, scene: Scene) -> None:
+        corners_m = marking_corners_m(scene.ground.street, scene.ground.stripe) * scene.scale
+        at = np.array(self._pixels(corners_m.reshape(-1, 2) + self._shift_m)).reshape(-1, 4, 2)
+        for corners in at.tolist():
+            draw.polygon([tuple(corner) for corner in corners], fill=WHITE)
 
     def _draw_landmarks(self, draw: ImageDraw.ImageDraw) -> None:
         landmarks = self._campus.landmarks
-        for kind, place_m in zip(landmarks.kind, landmarks.position_m, strict=True):
-            if kind != "pole":
-                draw.polygon(self._pixels(self._building_m(place_m) + self._shift_m), fill=ROOF)
+        for roof_m in self._roofs_m():
+            draw.polygon(self._pixels(roof_m + self._shift_m), fill=ROOF)
         for kind, place_m in zip(landmarks.kind, landmarks.position_m, strict=True):
             if kind == "pole":
                 self._draw_pole(draw, place_m + self._shift_m)
+        if self._scene is not None:
+            self._draw_trees(draw, self._scene.trees)
+
+    def _draw_trees(self, draw: ImageDraw.ImageDraw, trees: Trees) -> None:
+        for place_m, radius_m in zip(trees.place_m, trees.crown_radius_m.tolist(), strict=True):
+            ((x, y),) = self._pixels((place_m + self._shift_m)[None, :])
+            draw.ellipse(_around(x, y, radius_m * self._pixels_per_m), fill=CROWN)
 
     def _draw_pole(self, draw: ImageDraw.ImageDraw, place_m: Floats) -> None:
         """A pole seen from above: its shadow begins at its base, which is what is labelled."""
@@ -113,25 +147,24 @@ class _Drawing:
         draw.ellipse(_around(*base, POLE_M * self._pixels_per_m / 2 + 1.0), fill=SHADE)
         draw.ellipse(_around(*base, POLE_M * self._pixels_per_m / 2), fill=POLE)
 
-    def _building_m(self, corner_m: Floats) -> Floats:
-        """The roof (4, 2) of a building that has a corner here, away from the street beside it."""
-        streets = self._campus.streets
-        begin_m, end_m = streets.junction_m[streets.street[:, 0]], streets.junction_m[streets.street[:, 1]]
-        span_m = end_m - begin_m
-        share = np.clip(((corner_m - begin_m) * span_m).sum(axis=1) / (span_m**2).sum(axis=1), 0.0, 1.0)
-        off_m = corner_m - (begin_m + share[:, None] * span_m)
-        away_m = off_m[np.hypot(*off_m.T).argmin()]
-        out = BUILDING_M * away_m / max(float(np.hypot(*away_m)), 1e-9)
-        along = np.array([-out[1], out[0]])
-        return np.array([corner_m, corner_m + along, corner_m + along + out, corner_m + out])
+    def _roofs_m(self) -> Floats:
+        """The roofs (n, 4, 2) of buildings: the scene's, else one for each corner, away from the street beside it."""
+        if self._scene is not None:
+            return self._scene.buildings.corner_m
+        landmarks, roofs = self._campus.landmarks, list[Floats]()
+        for kind, corner_m in zip(landmarks.kind, landmarks.position_m, strict=True):
+            if kind != "pole":
+                out = BUILDING_M * away_from_street(self._campus.streets, corner_m)
+                roofs.append(footprint_m(corner_m, np.array([-out[1], out[0]]), out))
+        return np.array(roofs).reshape(-1, 4, 2)
 
     def _world_pixels(self, point_m: Floats) -> Floats:
         lat_deg, lon_deg = wgs84_from_map_points(point_m, self._campus.frame)
         return np.column_stack(tile_coordinates(lat_deg, lon_deg, ZOOM_MOST)) * TILE_PIXELS
 
     def _pixels(self, point_m: Floats) -> list[tuple[float, float]]:
-        """Where points (n, 2) of the map frame are on the canvas."""
-        at = self._world_pixels(point_m) - self._first * TILE_PIXELS
+        """Where points (n, 2) of the map frame are on the canvas; a drawing's whole numbers are the pixels' middles."""
+        at = self._world_pixels(point_m) - self._first * TILE_PIXELS - self._middle
         return [(float(x), float(y)) for x, y in at]
 
 

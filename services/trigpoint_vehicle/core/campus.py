@@ -155,18 +155,23 @@ def _odometry(world: _World, motion: Motion, *, index: int, first_stamp_ns: int)
     return timed
 
 
+def first_stamp_ns(settings: CampusSettings, vehicle_index: int) -> int:
+    """When a vehicle sets off."""
+    return round((settings.first_stamp_s + vehicle_index * settings.vehicle_interval_s) * 1e9)
+
+
 def _driven(world: _World, motion: Motion, index: int) -> _Driven:
     settings, vehicle = world.settings, f"vehicle-{index + 1}"
-    first_stamp_ns = round((settings.first_stamp_s + index * settings.vehicle_interval_s) * 1e9)
-    timed = _odometry(world, motion, index=index, first_stamp_ns=first_stamp_ns)
-    fixes, true_fixes = _fixes(world, motion, vehicle, index=index, first_stamp_ns=first_stamp_ns)
-    sweeps, seen = _sweeps(world, motion, index=index, first_stamp_ns=first_stamp_ns)
+    begin_ns = first_stamp_ns(settings, index)
+    timed = _odometry(world, motion, index=index, first_stamp_ns=begin_ns)
+    fixes, true_fixes = _fixes(world, motion, vehicle, index=index, first_stamp_ns=begin_ns)
+    sweeps, seen = _sweeps(world, motion, index=index, first_stamp_ns=begin_ns)
     timed += fixes if settings.carried.gnss else []
     timed += sweeps if settings.carried.landmarks else []
     boot_id = boot_id_of(b"campus", str(world.seed).encode(), vehicle.encode(), repr(settings).encode())
     return _Driven(
         recording=recording_of(_described(vehicle, settings), timed, boot_id=boot_id),
-        path=_true_path(world, motion, vehicle, first_stamp_ns),
+        path=_true_path(world, motion, vehicle, begin_ns),
         fixes=true_fixes,
         motion=motion,
         sightings=seen,

@@ -27,7 +27,7 @@ class PlacedLandmarks:
     diameter_m: Floats
 
 
-def _candidates_m(
+def candidates_beside_streets_m(
     streets: Streets,
     setback_m: tuple[float, float],
     settings: LandmarkSettings,
@@ -35,6 +35,7 @@ def _candidates_m(
     count: int,
     rng: np.random.Generator,
 ) -> Floats:
+    """Places (count, 2) drawn at random along all streets, so far to either side of their middle."""
     weight = streets.length_m * np.where(streets.in_quadrangle, settings.quadrangle_weight, 1.0)
     street = streets.street[rng.choice(len(weight), size=count, p=weight / weight.sum())]
     begin_m, end_m = streets.junction_m[street[:, 0]], streets.junction_m[street[:, 1]]
@@ -45,7 +46,8 @@ def _candidates_m(
     return drawn
 
 
-def _street_distance_m(streets: Streets, point_m: Floats) -> Floats:
+def street_distance_m(streets: Streets, point_m: Floats) -> Floats:
+    """How far points (n, 2) are from the nearest street's middle."""
     begin_m = streets.junction_m[streets.street[:, 0]][None]
     span_m = streets.junction_m[streets.street[:, 1]][None] - begin_m
     offset_m = point_m[:, None, :] - begin_m
@@ -74,7 +76,7 @@ class _Ground:
     settings: LandmarkSettings
 
     def clear_of_traffic(self, point_m: Floats) -> Floats:
-        off_street = _street_distance_m(self.streets, point_m) >= self.settings.street_clearance_m
+        off_street = street_distance_m(self.streets, point_m) >= self.settings.street_clearance_m
         off_track = self.driven.query(point_m)[0] >= self.settings.driven_clearance_m
         clear: Floats = point_m[off_street & off_track]
         return clear
@@ -84,7 +86,7 @@ def _poles_m(ground: _Ground, rng: np.random.Generator) -> list[Floats]:
     streets, settings = ground.streets, ground.settings
     setback_m = (settings.pole_setback_min_m, settings.pole_setback_max_m)
     single = settings.pole_count - settings.pair_count
-    drawn = _candidates_m(streets, setback_m, settings, count=CANDIDATES_FACTOR * max(single, 1), rng=rng)
+    drawn = candidates_beside_streets_m(streets, setback_m, settings, count=CANDIDATES_FACTOR * max(single, 1), rng=rng)
     poles = _spaced(ground.clear_of_traffic(drawn), [], count=single, spacing_m=settings.spacing_min_m)
     turn = rng.uniform(0.0, 2.0 * np.pi, (len(poles), PAIR_DIRECTIONS))
     ring = settings.pair_distance_m * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
@@ -108,7 +110,7 @@ def placed_landmarks(
     ground = _Ground(streets, cKDTree(driven_m), settings)
     poles = _poles_m(ground, rng)
     setback_m = (settings.corner_setback_min_m, settings.corner_setback_max_m)
-    drawn = _candidates_m(
+    drawn = candidates_beside_streets_m(
         streets, setback_m, settings, count=CANDIDATES_FACTOR * max(settings.corner_count, 1), rng=rng
     )
     clear = ground.clear_of_traffic(drawn)

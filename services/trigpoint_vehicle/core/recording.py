@@ -2,7 +2,7 @@
 
 import hashlib
 import heapq
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
@@ -10,6 +10,7 @@ from trigpoint.events.corrected import AnchorLabelled
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.observed import Observed, VehicleDescribed
 from trigpoint.events.truth import Truth
+from trigpoint.events.truth_objects import TruthObject
 
 Timed = tuple[int, Observed]
 BOOT_ID_DIGITS = 16  # 64 bits of SHA-256: enough to tell drives apart
@@ -20,17 +21,19 @@ class Recording:
     """Everything one vehicle said in one boot, numbered from 0 in order of stamp."""
 
     vehicle: str
-    rows: tuple[Envelope[Observed], ...]
+    rows: Sequence[Envelope[Observed]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Conversion:
-    """What a source holds: recordings, and kept apart from them truth and anchors; `remarks` for a person to read."""
+    """What a source holds: recordings, and kept apart from them truth, a simulated world's objects, and anchors;
+    `remarks` for a person to read."""
 
     recordings: tuple[Recording, ...]
     truth: Truth
     anchors: tuple[AnchorLabelled, ...]
     remarks: tuple[str, ...] = ()
+    objects: tuple[TruthObject, ...] = ()
 
 
 def boot_id_of(*parts: bytes) -> str:

@@ -12,8 +12,20 @@ from command_runs.small_campus import SEED, small_settings
 from trigpoint.geodesy.projection import wgs84_from_map_points
 from trigpoint.geodesy.web_tiles import WebTile, tile_coordinates
 from trigpoint_vehicle.aerial_files import PictureFolder, viewer_configuration, write_pictures
-from trigpoint_vehicle.core.aerial import AROUND_M, POLE, ZOOM_LEAST, ZOOM_MOST, AerialPicture, aerial_pictures
+from trigpoint_vehicle.core.aerial import (
+    AROUND_M,
+    POLE,
+    ROOF,
+    WHITE,
+    ZOOM_LEAST,
+    ZOOM_MOST,
+    AerialPicture,
+    aerial_pictures,
+)
 from trigpoint_vehicle.core.campus import Campus, simulate_campus
+from trigpoint_vehicle.core.lidar_settings import SceneSettings
+from trigpoint_vehicle.core.scene.markings import marking_corners_m
+from trigpoint_vehicle.core.scene.world import Laid, Scene, made_scene
 
 Floats = NDArray[np.float64]
 Tiles = dict[WebTile, Image.Image]
@@ -91,3 +103,49 @@ def test_the_configuration_names_every_picture(tmp_path: Path) -> None:
     one = PictureFolder(image='a "b"', folder=tmp_path / "a", bounds=(151.0, -34.0, 151.5, -33.5))
     (raster,) = tomllib.loads(viewer_configuration([one], tmp_path))["web"]["rasters"]
     assert (raster["images"], raster["bounds"], raster["ending"]) == (['a "b"'], [151.0, -34.0, 151.5, -33.5], "webp")
+
+
+@pytest.fixture(scope="module")
+def scene(campus: Campus) -> Scene:
+    laid = Laid(
+        streets=campus.streets, landmarks=campus.landmarks, motions=campus.motions, scale=campus.frame.point_scale
+    )
+    return made_scene(SEED, laid, small_settings().landmarks, SceneSettings())
+
+
+@pytest.fixture(scope="module")
+def scanned_tiles(campus: Campus, scene: Scene) -> Tiles:
+    """The western picture of the world a lidar looks at."""
+    return dict(next(aerial_pictures(campus, small_settings(), seed=SEED, scene=scene)).tiles())
+
+
+def test_a_lidar_s_markings_are_seen_from_above_where_they_are_painted(
+    campus: Campus, scene: Scene, scanned_tiles: Tiles
+) -> None:
+    corner_m = marking_corners_m(scene.ground.street[:1], scene.ground.stripe) * scene.scale  # a street in the west
+    wide = np.hypot(*(corner_m[:, 2] - corner_m[:, 1]).T) > 0.45  # bars of crossings: four pixels
+    seen = [pixel(scanned_tiles, campus, one + campus.imagery.offset_m[0]) for one in corner_m[wide].mean(axis=1)]
+    assert len(seen) == 14
+    assert set(seen) == {WHITE}
+
+
+def test_a_crossing_s_bar_is_seen_within_half_a_pixel_of_its_place(
+    campus: Campus, scene: Scene, scanned_tiles: Tiles
+) -> None:
+    corner_m = marking_corners_m(scene.ground.street[:1], scene.ground.stripe) * scene.scale
+    bar_m = corner_m[np.hypot(*(corner_m[:, 2] - corner_m[:, 1]).T) > 0.45][3]
+    step_m = np.stack(np.meshgrid(*[np.arange(-2.0, 2.0, 0.02)] * 2), axis=-1).reshape(-1, 2)
+    ahead = (bar_m[1] - bar_m[0]) / np.hypot(*(bar_m[1] - bar_m[0]))
+    within = (np.abs(step_m @ ahead) < 2.0) & (np.abs(step_m @ (-ahead[1], ahead[0])) < 0.45)  # this bar alone
+    place_m = bar_m.mean(axis=0) + step_m[within][::7]
+    white = [pixel(scanned_tiles, campus, one + campus.imagery.offset_m[0]) == WHITE for one in place_m]
+    off_m = place_m[white].mean(axis=0) - bar_m.mean(axis=0)
+    assert np.hypot(*off_m) < 0.065  # m: half a pixel
+
+
+def test_a_lidar_s_buildings_are_the_roofs_seen_from_above(campus: Campus, scene: Scene, scanned_tiles: Tiles) -> None:
+    middle_m = scene.buildings.corner_m.mean(axis=1)
+    west = middle_m[middle_m[:, 0] < small_settings().streets.width_m / 2]
+    seen = [pixel(scanned_tiles, campus, one + campus.imagery.offset_m[0]) for one in west]
+    assert len(seen) > 3
+    assert np.mean([one == ROOF for one in seen]) > 0.7  # crowns hang over some

@@ -1,0 +1,1 @@
+"""The campus in three dimensions: ground, buildings, poles, trees, cars and walkers."""

@@ -1,0 +1,1 @@
+"""Worlds for the simulated lidar: short drives with exact sensors."""
