@@ -21,6 +21,7 @@ from trigpoint_evaluation.app import TruthEvaluation
 from trigpoint_ingest.anchor_files import read_anchor_file
 from trigpoint_ingest.anchors import import_anchors
 from trigpoint_ingest.core.tally import IngestReport
+from trigpoint_perception.app import perceive_log
 from trigpoint_vehicle.aerial_files import write_viewer_configuration
 from trigpoint_vehicle.app import record_campus
 from trigpoint_vehicle.settings import SimulationSettings
@@ -59,6 +60,9 @@ def command(out: Path, *, aerial: bool, screen: Screen, **simulated: Any) -> Ans
         with screen.counting("driving, over Zenoh", unit="messages") as progress:
             ingested = ingest_live(logs, log, progress)
         import_anchors(read_anchor_file(data.anchors), log)
+        if settings.lidar:
+            with screen.part_of("perceiving") as progress:
+                perceive_log(log, progress=progress)
         built = build_map(data, log, screen, method="anchored")
         found = write_report(data, log, screen, truth_path=data.truth, built=built)
     assert found is not None, "truth was written above"
