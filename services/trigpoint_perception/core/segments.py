@@ -13,6 +13,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 GAP_STEPS = 3.5  # azimuth steps without a return between two points: nothing connects them
+STEP_SAMPLED_EVERY = 7  # points: enough to know the step between neighbours
 AZIMUTH_STEPS = 1 << 20  # of a full turn: finer than any sensor's encoder
 
 
@@ -61,8 +62,9 @@ def ordered_sweep(sweep: Sweep, height_m: Floats) -> OrderedSweep:
     turn = ((azimuth_rad + np.pi) / (2.0 * np.pi) * AZIMUTH_STEPS).astype(np.int64)
     row = np.argsort(sweep.ring * (AZIMUTH_STEPS + 1) + turn, kind="stable")
     ring, azimuth_rad = sweep.ring[row], azimuth_rad[row]
-    step = np.diff(azimuth_rad)
-    step = step[(step > 0.0) & (np.diff(ring) == 0)]
+    sampled = np.arange(0, len(row) - 1, STEP_SAMPLED_EVERY)
+    step = azimuth_rad[sampled + 1] - azimuth_rad[sampled]
+    step = step[(step > 0.0) & (ring[sampled + 1] == ring[sampled])]
     direction_m = sweep.direction_m[row]
     return OrderedSweep(
         row=row,

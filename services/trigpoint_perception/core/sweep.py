@@ -15,6 +15,7 @@ Ints = NDArray[np.int64]
 UNIT_TOLERANCE = 1e-3  # of a quaternion's length
 ELEVATION_STEP_RAD = 0.007  # 0.4 degrees: rings told by elevation where the sensor does not say
 MIN_RINGS_BY_NUMBER = 2
+SAMPLED_EVERY = 5  # points, coprime with every sensor's number of lasers: enough to know each one's elevation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,14 +102,19 @@ def _checked_rotation(scanned: PointsScanned, settings: SweepSettings) -> Floats
 
 def _rings_by_elevation(own_m: Floats, ring: NDArray[np.uint16]) -> Ints:
     """Rings (n,) numbered from the lowest up, for points (n, 3) in the sensor's frame."""
-    elevation_rad = np.arctan2(own_m[:, 2], np.hypot(own_m[:, 0], own_m[:, 1]))
     number = ring.astype(np.int64)
     if number.max() - number.min() + 1 < MIN_RINGS_BY_NUMBER:
-        number = np.floor(elevation_rad / ELEVATION_STEP_RAD).astype(np.int64)
+        number = np.floor(_elevations_rad(own_m) / ELEVATION_STEP_RAD).astype(np.int64)
         return number - int(number.min())
-    count = np.bincount(number)
-    mean_rad = np.bincount(number, weights=elevation_rad) / np.maximum(count, 1)
-    order = np.argsort(np.where(count > 0, mean_rad, np.inf), kind="stable")
+    rings = int(number.max()) + 1
+    count = np.bincount(number[::SAMPLED_EVERY], minlength=rings)
+    total_rad = np.bincount(number[::SAMPLED_EVERY], _elevations_rad(own_m[::SAMPLED_EVERY]), minlength=rings)
+    order = np.argsort(np.where(count > 0, total_rad / np.maximum(count, 1), np.inf), kind="stable")
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))
     return rank[number]
+
+
+def _elevations_rad(own_m: Floats) -> Floats:
+    elevation_rad: Floats = np.arctan2(own_m[:, 2], np.hypot(own_m[:, 0], own_m[:, 1]))
+    return elevation_rad
