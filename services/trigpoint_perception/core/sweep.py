@@ -20,14 +20,18 @@ SAMPLED_EVERY = 5  # points, coprime with every sensor's number of lasers: enoug
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sweep:
-    """What is usable of a sweep, n points. `point_m` (n, 3) in the base frame, `direction_m` (n, 3) from the sensor in
-    the base's axes, `offset_ns` (n,) after the sweep's stamp, `ring` (n,) counted from the lowest laser up.
+    """What is usable of a sweep, n points. `point_m` (n, 3) in the base frame, `offset_ns` (n,) after its stamp,
+    `ring` (n,) counted from the lowest laser up.
+
+    `azimuth_rad` and `run_m` (n,): each point's direction from the sensor when it was measured, in the base's axes, and
+    its horizontal distance.
 
     `sensor_m` (3,): the sensor in the base frame; `dropped`: points without a return, or out of range.
     """
 
     point_m: Floats
-    direction_m: Floats
+    azimuth_rad: Floats
+    run_m: Floats
     offset_ns: Ints
     ring: Ints
     sensor_m: Floats
@@ -68,7 +72,8 @@ def usable_sweep(scanned: PointsScanned, settings: SweepSettings) -> Sweep:
     direction_m = own_m @ rotation.T
     return Sweep(
         point_m=direction_m + scanned.sensor_position_m,
-        direction_m=direction_m,
+        azimuth_rad=np.arctan2(direction_m[:, 1], direction_m[:, 0]),
+        run_m=np.hypot(direction_m[:, 0], direction_m[:, 1]),
         offset_ns=scanned.offset_ns[usable].astype(np.int64),
         ring=_rings_by_elevation(own_m, scanned.ring[usable]),
         sensor_m=np.asarray(scanned.sensor_position_m, dtype=np.float64),
