@@ -96,7 +96,7 @@ FLOWS: tuple[Flow, ...] = (
     Flow(FixJudged, FILTERING, (OPTIMISATION, EVALUATION)),
     Flow(PoseFiltered, FILTERING, (EVALUATION,)),
     Flow(GateAlarmed, FILTERING, (EVALUATION,)),
-    Flow(LandmarksPerceived, PERCEPTION, ()),
+    Flow(LandmarksPerceived, PERCEPTION, (OPTIMISATION,)),
     Flow(OdometryMatched, PERCEPTION, ()),
     Flow(TrajectorySolved, OPTIMISATION, (LANDMARKS, EVALUATION)),
     Flow(LandmarkSolved, OPTIMISATION, (LANDMARKS, EVALUATION)),
