@@ -14,12 +14,11 @@ from trigpoint.events.mapped import AnchorAssociated, ImageOffsetSolved, Mapped,
 from trigpoint.events.names import nearest_names
 from trigpoint.events.observed import LandmarksDetected, VehicleDescribed
 from trigpoint.events.perceived import LandmarksPerceived
-from trigpoint.events.perceived_detections import detected_in
 from trigpoint.landmarks.model import Landmark, MapVersion, valid_at
 from trigpoint.landmarks.ports import LandmarkStore
 from trigpoint.landmarks.queries import Disc, LandmarkQuery, require_known_version
+from trigpoint.logs.perceived_readings import PERCEIVED_STREAM, detected_in
 from trigpoint.logs.ports import EventLog, LoggedBoot, LoggedEvent
-from trigpoint.logs.readings import PERCEIVED_STREAM
 from trigpoint_evaluation.core.explanation import (
     AnchorName,
     DriveName,

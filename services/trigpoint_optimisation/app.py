@@ -10,11 +10,11 @@ from trigpoint.events.codec import Event
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.mapped import Mapped, MapSolved
+from trigpoint.logs.perceived_readings import PERCEIVED_STREAM
 from trigpoint.logs.ports import EventLog
 from trigpoint.logs.readings import (
     FRAME_STREAM,
     LABEL_STREAM,
-    PERCEIVED_STREAM,
     VERDICT_STREAM,
     logged_anchors,
     logged_drives,
@@ -35,9 +35,8 @@ STREAM = STREAM_PATTERNS[MapSolved]
 
 def input_positions(log: EventLog) -> tuple[tuple[str, int], ...]:
     """How many events of each stream a solve of the log as it stands is made from."""
-    streams = (*vehicle_streams(log), FRAME_STREAM, LABEL_STREAM, VERDICT_STREAM)
-    if log.next_number(PERCEIVED_STREAM):
-        streams = (*streams, PERCEIVED_STREAM)
+    perceived = (PERCEIVED_STREAM,) if log.next_number(PERCEIVED_STREAM) else ()
+    streams = (*vehicle_streams(log), FRAME_STREAM, LABEL_STREAM, VERDICT_STREAM, *perceived)
     return tuple((stream, log.next_number(stream)) for stream in streams)
 
 

@@ -27,10 +27,10 @@ from trigpoint.events.mapped import LandmarkSolved, Mapped, MapSolved, OdometryC
 from trigpoint.events.observed import Observed
 from trigpoint.geodesy.projection import MapFrame
 from trigpoint.logs.following import StreamFollower
+from trigpoint.logs.perceived_readings import PERCEIVED_STREAM
 from trigpoint.logs.ports import EventLog
 from trigpoint.logs.readings import (
     LABEL_STREAM,
-    PERCEIVED_STREAM,
     VEHICLE_PREFIX,
     VERDICT_STREAM,
     logged_corrections,

@@ -4,6 +4,7 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import cast
@@ -129,7 +130,7 @@ def sharpness(log_path: Path, points: str, registered_by: str) -> Sharpness:
         poses = _matched(odometry, placed, poses)
     parts = []
     for sweep, T_map_base in zip(placed, poses, strict=True):
-        near = np.hypot(sweep.direction_m[:, 0], sweep.direction_m[:, 1]) < MAPPED_RANGE_M
+        near = sweep.run_m < MAPPED_RANGE_M
         point_m = sweep.point_m[near & (sweep.point_m[:, 2] > ABOVE_GROUND_M)][::2]
         parts.append(point_m @ T_map_base[:3, :3].T + T_map_base[:3, 3])
     mapped_m = np.concatenate(parts)
@@ -141,14 +142,7 @@ def _placed(sweep: NumberedSweep, points: str, path: BasePath) -> Sweep:
     if points == RAW:
         return usable
     still_m = deskewed(usable.point_m, usable.offset_ns, stamp_ns=sweep.stamp_ns, path=path)
-    return Sweep(
-        point_m=still_m,
-        direction_m=usable.direction_m,
-        offset_ns=usable.offset_ns,
-        ring=usable.ring,
-        sensor_m=usable.sensor_m,
-        dropped=usable.dropped,
-    )
+    return replace(usable, point_m=still_m)
 
 
 def _poses(path: BasePath, stamp_ns: NDArray[np.int64]) -> list[Floats]:

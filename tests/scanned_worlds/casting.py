@@ -144,4 +144,5 @@ def _nearest_runs(world: World, origin: Floats, direction: Floats, rise: Floats)
 
 def _is_hit(hit_m: Floats, rise: Floats, height_m: float) -> NDArray[np.bool_]:
     at_m = SENSOR_M[2] + hit_m * rise
-    return (hit_m > 0.0) & (at_m >= 0.0) & (at_m <= height_m)
+    hit: NDArray[np.bool_] = (hit_m > 0.0) & (at_m >= 0.0) & (at_m <= height_m)
+    return hit

@@ -47,61 +47,68 @@ def fitted_circle(arc: Arc, *, range_sigma_m: float, radius_max_m: float) -> Cir
     one side alone the points hardly tell a large circle from a near one, and the covariance says so. Its scale is the
     larger of the sensor's noise and the residuals found; neighbours' errors are taken as shared.
     """
-    sight_m = arc.point_m.mean(axis=0) - arc.viewpoint_m
-    away_m = float(np.hypot(sight_m[0], sight_m[1]))
-    width_m, width_sigma_m = _width(arc, arc.step_rad * away_m, away_m)
-    prior_m = min(max(0.5 * width_m, RADIUS_MIN_M), radius_max_m)
-    begin_m = arc.viewpoint_m + sight_m * (1.0 + MEAN_DEPTH * prior_m / away_m)
-    state, information, residual_m = _iterated(
-        arc.point_m, begin_m, prior_m, 0.5 * width_sigma_m, range_sigma_m, radius_max_m
-    )
-    inflation = max(1.0, (residual_m / range_sigma_m) ** 2) * min(SHARED_POINTS, len(arc.point_m))
-    covariance = np.linalg.inv(information) * inflation
+    fitted = _fitted(arc.point_m, arc.viewpoint_m, arc.width_m, np.array([arc.step_rad, range_sigma_m, radius_max_m]))
+    state, covariance, residual_m = fitted
     return Circle(
         centre_m=state[:2],
         radius_m=float(state[2]),
-        covariance_m2=covariance[:2, :2] + SYSTEMATIC_SIGMA_M**2 * np.eye(2),
-        radius_sigma_m=float(np.sqrt(min(covariance[2, 2], (0.5 * width_sigma_m) ** 2) + SYSTEMATIC_SIGMA_M**2)),
+        covariance_m2=covariance[:2, :2],
+        radius_sigma_m=math.sqrt(covariance[2, 2]),
         residual_m=residual_m,
     )
 
 
-def _width(arc: Arc, beam_m: float, away_m: float) -> tuple[float, float]:
-    """The width in m and its 1-sigma: beams fall at random on the two edges, and touch an object half a beam early."""
-    ordered = np.sort(arc.width_m)
-    count = len(ordered)
-    spread_m = 0.74 * float(ordered[(3 * count) // 4] - ordered[count // 4]) if count > 1 else 0.0
-    sigma_m = math.hypot(max(beam_m / math.sqrt(6.0), spread_m) / math.sqrt(count), SYSTEMATIC_SIGMA_M)
-    return float(ordered[count // 2]) + beam_m - 0.5 * DIVERGENCE_RAD * away_m, sigma_m
+@compiled
+def _fitted(point_m: Floats, viewpoint_m: Floats, width_m: Floats, limits: Floats) -> tuple[Floats, Floats, float]:
+    """Centre and radius (3,), their covariance (3, 3), the residual; limits (3,): step, range's sigma, radius."""
+    step_rad, sigma_m, radius_max_m = limits
+    sight_m = np.array([point_m[:, 0].mean(), point_m[:, 1].mean()]) - viewpoint_m
+    away_m = np.hypot(sight_m[0], sight_m[1])
+    across_m, across_sigma_m = _width(width_m, step_rad * away_m, away_m)
+    prior_m = min(max(0.5 * across_m, RADIUS_MIN_M), radius_max_m)
+    state = np.empty(3)
+    state[:2] = viewpoint_m + sight_m * (1.0 + MEAN_DEPTH * prior_m / away_m)
+    state[2] = prior_m
+    information = np.eye(3)
+    for _ in range(ITERATIONS):
+        information, gradient = _normal_equations(point_m, state, sigma_m)
+        information[2, 2] += 4.0 / across_sigma_m**2  # of a radius, half a width
+        gradient[2] += (state[2] - prior_m) * 4.0 / across_sigma_m**2
+        information[0, 0] += 1e-6 / across_sigma_m**2  # solvable where all points lie in one direction
+        information[1, 1] += 1e-6 / across_sigma_m**2
+        state = state - np.linalg.solve(information, gradient)
+        state[2] = min(max(state[2], RADIUS_MIN_M), radius_max_m)
+    away = np.sqrt((point_m[:, 0] - state[0]) ** 2 + (point_m[:, 1] - state[1]) ** 2) - state[2]
+    residual_m = np.sqrt((away**2).mean())
+    covariance = np.linalg.inv(information) * max(1.0, (residual_m / sigma_m) ** 2) * min(SHARED_POINTS, len(away))
+    covariance[2, 2] = min(covariance[2, 2], 0.25 * across_sigma_m**2)
+    for axis in range(3):
+        covariance[axis, axis] += SYSTEMATIC_SIGMA_M**2
+    return state, covariance, residual_m
 
 
 @compiled
-def _iterated(
-    point_m: Floats, begin_m: Floats, prior_m: float, prior_sigma_m: float, sigma_m: float, radius_max_m: float
-) -> tuple[Floats, Floats, float]:
-    """Centre and radius (3,), their information (3, 3), and the points' root mean square distance."""
-    state = np.array([begin_m[0], begin_m[1], prior_m])
-    information = np.eye(3)
-    for _ in range(ITERATIONS):
-        information = np.zeros((3, 3))
-        gradient = np.zeros(3)
-        for row in range(len(point_m)):
-            x, y = point_m[row, 0] - state[0], point_m[row, 1] - state[1]
-            distance = max(np.hypot(x, y), 1e-9)
-            residual = distance - state[2]
-            weight = 1.0 / (sigma_m**2 * max(1.0, abs(residual) / (2.0 * sigma_m)))
-            derivative = np.array([-x / distance, -y / distance, -1.0])
-            for one in range(3):
-                gradient[one] += weight * derivative[one] * residual
-                for other in range(3):
-                    information[one, other] += weight * derivative[one] * derivative[other]
-        information[2, 2] += 1.0 / prior_sigma_m**2
-        gradient[2] += (state[2] - prior_m) / prior_sigma_m**2
-        information[0, 0] += 1e-6 / prior_sigma_m**2  # solvable where all points lie in one direction
-        information[1, 1] += 1e-6 / prior_sigma_m**2
-        state = state - np.linalg.solve(information, gradient)
-        state[2] = min(max(state[2], RADIUS_MIN_M), radius_max_m)
-    squares = 0.0
+def _width(width_m: Floats, beam_m: float, away_m: float) -> tuple[float, float]:
+    """The width in m and its 1-sigma: beams fall at random on the two edges, and touch an object half a beam early."""
+    ordered = np.sort(width_m)
+    count = len(ordered)
+    spread_m = 0.74 * (ordered[(3 * count) // 4] - ordered[count // 4])
+    sigma_m = np.hypot(max(beam_m / np.sqrt(6.0), spread_m) / np.sqrt(count), SYSTEMATIC_SIGMA_M)
+    return ordered[count // 2] + beam_m - 0.5 * DIVERGENCE_RAD * away_m, sigma_m
+
+
+@compiled
+def _normal_equations(point_m: Floats, state: Floats, sigma_m: float) -> tuple[Floats, Floats]:
+    """Information (3, 3) and gradient (3,) of the points' distances from the circle, with Huber's weights."""
+    information, gradient, derivative = np.zeros((3, 3)), np.zeros(3), np.empty(3)
     for row in range(len(point_m)):
-        squares += (np.hypot(point_m[row, 0] - state[0], point_m[row, 1] - state[1]) - state[2]) ** 2
-    return state, information, np.sqrt(squares / len(point_m))
+        x, y = point_m[row, 0] - state[0], point_m[row, 1] - state[1]
+        distance = max(np.hypot(x, y), 1e-9)
+        residual = distance - state[2]
+        weight = 1.0 / (sigma_m**2 * max(1.0, abs(residual) / (2.0 * sigma_m)))
+        derivative[0], derivative[1], derivative[2] = -x / distance, -y / distance, -1.0
+        for one in range(3):
+            gradient[one] += weight * derivative[one] * residual
+            for other in range(3):
+                information[one, other] += weight * derivative[one] * derivative[other]
+    return information, gradient

@@ -12,7 +12,7 @@ from trigpoint_perception.core.compiled import compiled
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-SLOT_NS = 200_000  # points of so short a time share one pose: 4 mm at 20 m/s
+SLOT_NS = 500_000  # points of so short a time share one pose: within 5 mm at 20 m/s
 REACH_NS = 150_000_000  # beyond a path's ends its motion is taken to go on: one sweep
 NS_PER_S = 1e9
 

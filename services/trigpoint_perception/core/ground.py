@@ -8,6 +8,7 @@ from trigpoint_perception.core.sweep import Sweep
 from trigpoint_perception.settings import GroundSettings
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 SLOPE_OF_ANY = 0.2  # deeper than this below the base frame's ground is a mirrored point, and no ground
 DEPTH_OF_ANY_M = 0.25
@@ -21,25 +22,22 @@ def heights_above_ground(sweep: Sweep, settings: GroundSettings, *, range_max_m:
     `slope_max` and a kerb allow holds no ground; between bins the profile is straight, beyond the last it is level.
     """
     bins = int(np.ceil(range_max_m / settings.bin_m)) + 1
-    lowest = _lowest(sweep.point_m, sweep.sensor_m, settings.sectors, bins, settings.bin_m)
+    z_m = sweep.point_m[:, 2]
+    sector = ((sweep.azimuth_rad + np.pi) / (2.0 * np.pi) * settings.sectors).astype(np.int64) % settings.sectors
+    lowest = _lowest(z_m, sweep.run_m, sector, (settings.sectors, bins), settings.bin_m)
     profile = _profiles(lowest, settings.bin_m, settings.slope_max, settings.step_m)
     turned = [np.roll(profile, shift, axis=0) for shift in range(-SMOOTHED_SECTORS, SMOOTHED_SECTORS + 1)]
-    return _heights(sweep.point_m, sweep.sensor_m, np.median(turned, axis=0), settings.bin_m)
+    return _heights(z_m, sweep.run_m, sector, np.median(turned, axis=0), settings.bin_m)
 
 
 @compiled
-def _lowest(point_m: Floats, sensor_m: Floats, sectors: int, bins: int, bin_m: float) -> Floats:
+def _lowest(z_m: Floats, run_m: Floats, sector: Ints, shape: tuple[int, int], bin_m: float) -> Floats:
     """The lowest point's height (sectors, bins), infinite where a bin holds none."""
-    lowest = np.full((sectors, bins), np.inf)
-    for row in range(len(point_m)):
-        x = point_m[row, 0] - sensor_m[0]
-        y = point_m[row, 1] - sensor_m[1]
-        run = np.hypot(x, y)
-        if point_m[row, 2] < -SLOPE_OF_ANY * run - DEPTH_OF_ANY_M:
-            continue
-        sector = int((np.arctan2(y, x) + np.pi) / (2.0 * np.pi) * sectors) % sectors
-        number = min(int(run / bin_m), bins - 1)
-        lowest[sector, number] = min(lowest[sector, number], point_m[row, 2])
+    lowest = np.full(shape, np.inf)
+    for row in range(len(z_m)):
+        if z_m[row] >= -SLOPE_OF_ANY * run_m[row] - DEPTH_OF_ANY_M:
+            number = min(int(run_m[row] / bin_m), shape[1] - 1)
+            lowest[sector[row], number] = min(lowest[sector[row], number], z_m[row])
     return lowest
 
 
@@ -65,16 +63,13 @@ def _profiles(lowest: Floats, bin_m: float, slope_max: float, step_m: float) -> 
 
 
 @compiled
-def _heights(point_m: Floats, sensor_m: Floats, ground: Floats, bin_m: float) -> Floats:
-    sectors, bins = ground.shape
-    height = np.empty(len(point_m))
-    for row in range(len(point_m)):
-        x = point_m[row, 0] - sensor_m[0]
-        y = point_m[row, 1] - sensor_m[1]
-        sector = int((np.arctan2(y, x) + np.pi) / (2.0 * np.pi) * sectors) % sectors
-        at = min(max(np.hypot(x, y) / bin_m - 0.5, 0.0), bins - 1.0)
+def _heights(z_m: Floats, run_m: Floats, sector: Ints, ground: Floats, bin_m: float) -> Floats:
+    bins = ground.shape[1]
+    height = np.empty(len(z_m))
+    for row in range(len(z_m)):
+        at = min(max(run_m[row] / bin_m - 0.5, 0.0), bins - 1.0)
         number = min(int(at), bins - 2)
         share = at - number
-        below = (1.0 - share) * ground[sector, number] + share * ground[sector, number + 1]
-        height[row] = point_m[row, 2] - below
+        below = (1.0 - share) * ground[sector[row], number] + share * ground[sector[row], number + 1]
+        height[row] = z_m[row] - below
     return height

@@ -159,7 +159,8 @@ class _Scene:
         return (chosen[near], rings) if standing and tall and straight and filled else None
 
     def _circle(self, chosen: Ints) -> Circle:
-        rows = np.concatenate([self._rows(segment) for segment in chosen])
+        ordered, segments = self.ordered, self.segments
+        rows = _rows(segments.first[chosen], segments.count[chosen], segments.ring[chosen], ordered.ring_begin)
         arc = Arc(
             point_m=self.ordered.point_m[rows, :2],
             viewpoint_m=self.sensor_m[:2],
@@ -167,14 +168,6 @@ class _Scene:
             step_rad=self.ordered.step_rad,
         )
         return fitted_circle(arc, range_sigma_m=self.settings.range_sigma_m, radius_max_m=self.settings.radius_max_m)
-
-    def _rows(self, segment: int) -> Ints:
-        """The ordered sweep's rows of a segment."""
-        ring = self.segments.ring[segment]
-        begin, end = self.ordered.ring_begin[ring], self.ordered.ring_begin[ring + 1]
-        steps = np.arange(self.segments.count[segment])
-        rows: Ints = begin + (self.segments.first[segment] - begin + steps) % (end - begin)
-        return rows
 
     def _is_person(self, circle: Circle, top_m: float) -> bool:
         """Whether what is as thick as a person ends at a person's height, and not where the sensor's view does."""
@@ -220,6 +213,20 @@ def _axis(centre_m: Floats, ring: Ints, height_m: Floats, outlier_m: float) -> t
     slope_x, slope_y = (x * z).sum() / rise, (y * z).sum() / rise
     scatter = np.sqrt(((x - slope_x * z) ** 2 + (y - slope_y * z) ** 2).mean())
     return near, len(rings), rings[-1] - rings[0] + 1, np.hypot(slope_x, slope_y), scatter
+
+
+@compiled
+def _rows(first: Ints, count: Ints, ring: Ints, ring_begin: Ints) -> Ints:
+    """The ordered sweep's rows of some segments, one after the other."""
+    rows = np.empty(count.sum(), np.int64)
+    found = 0
+    for segment in range(len(first)):
+        begin = ring_begin[ring[segment]]
+        size = ring_begin[ring[segment] + 1] - begin
+        for step in range(count[segment]):
+            rows[found] = begin + (first[segment] - begin + step) % size
+            found += 1
+    return rows
 
 
 @compiled

@@ -13,6 +13,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 GAP_STEPS = 3.5  # azimuth steps without a return between two points: nothing connects them
+STEP_SAMPLED_EVERY = 7  # points: enough to know the step between neighbours
 AZIMUTH_STEPS = 1 << 20  # of a full turn: finer than any sensor's encoder
 
 
@@ -57,19 +58,18 @@ class Segments:
 
 def ordered_sweep(sweep: Sweep, height_m: Floats) -> OrderedSweep:
     """The points of a sweep in order of ring and azimuth."""
-    azimuth_rad = np.arctan2(sweep.direction_m[:, 1], sweep.direction_m[:, 0])
-    turn = ((azimuth_rad + np.pi) / (2.0 * np.pi) * AZIMUTH_STEPS).astype(np.int64)
+    turn = ((sweep.azimuth_rad + np.pi) / (2.0 * np.pi) * AZIMUTH_STEPS).astype(np.int64)
     row = np.argsort(sweep.ring * (AZIMUTH_STEPS + 1) + turn, kind="stable")
-    ring, azimuth_rad = sweep.ring[row], azimuth_rad[row]
-    step = np.diff(azimuth_rad)
-    step = step[(step > 0.0) & (np.diff(ring) == 0)]
-    direction_m = sweep.direction_m[row]
+    ring, azimuth_rad = sweep.ring[row], sweep.azimuth_rad[row]
+    sampled = np.arange(0, len(row) - 1, STEP_SAMPLED_EVERY)
+    step = azimuth_rad[sampled + 1] - azimuth_rad[sampled]
+    step = step[(step > 0.0) & (ring[sampled + 1] == ring[sampled])]
     return OrderedSweep(
         row=row,
         ring_begin=np.searchsorted(ring, np.arange(int(ring[-1]) + 2)),
         ring=ring,
         azimuth_rad=azimuth_rad,
-        run_m=np.hypot(direction_m[:, 0], direction_m[:, 1]),
+        run_m=sweep.run_m[row],
         height_m=height_m[row],
         point_m=sweep.point_m[row],
         step_rad=float(np.median(step)) if len(step) else 2.0 * np.pi,

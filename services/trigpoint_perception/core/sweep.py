@@ -15,18 +15,23 @@ Ints = NDArray[np.int64]
 UNIT_TOLERANCE = 1e-3  # of a quaternion's length
 ELEVATION_STEP_RAD = 0.007  # 0.4 degrees: rings told by elevation where the sensor does not say
 MIN_RINGS_BY_NUMBER = 2
+SAMPLED_EVERY = 5  # points, coprime with every sensor's number of lasers: enough to know each one's elevation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sweep:
-    """What is usable of a sweep, n points. `point_m` (n, 3) in the base frame, `direction_m` (n, 3) from the sensor in
-    the base's axes, `offset_ns` (n,) after the sweep's stamp, `ring` (n,) counted from the lowest laser up.
+    """What is usable of a sweep, n points. `point_m` (n, 3) in the base frame, `offset_ns` (n,) after its stamp,
+    `ring` (n,) counted from the lowest laser up.
+
+    `azimuth_rad` and `run_m` (n,): each point's direction from the sensor when it was measured, in the base's axes, and
+    its horizontal distance.
 
     `sensor_m` (3,): the sensor in the base frame; `dropped`: points without a return, or out of range.
     """
 
     point_m: Floats
-    direction_m: Floats
+    azimuth_rad: Floats
+    run_m: Floats
     offset_ns: Ints
     ring: Ints
     sensor_m: Floats
@@ -67,7 +72,8 @@ def usable_sweep(scanned: PointsScanned, settings: SweepSettings) -> Sweep:
     direction_m = own_m @ rotation.T
     return Sweep(
         point_m=direction_m + scanned.sensor_position_m,
-        direction_m=direction_m,
+        azimuth_rad=np.arctan2(direction_m[:, 1], direction_m[:, 0]),
+        run_m=np.hypot(direction_m[:, 0], direction_m[:, 1]),
         offset_ns=scanned.offset_ns[usable].astype(np.int64),
         ring=_rings_by_elevation(own_m, scanned.ring[usable]),
         sensor_m=np.asarray(scanned.sensor_position_m, dtype=np.float64),
@@ -101,14 +107,19 @@ def _checked_rotation(scanned: PointsScanned, settings: SweepSettings) -> Floats
 
 def _rings_by_elevation(own_m: Floats, ring: NDArray[np.uint16]) -> Ints:
     """Rings (n,) numbered from the lowest up, for points (n, 3) in the sensor's frame."""
-    elevation_rad = np.arctan2(own_m[:, 2], np.hypot(own_m[:, 0], own_m[:, 1]))
     number = ring.astype(np.int64)
     if number.max() - number.min() + 1 < MIN_RINGS_BY_NUMBER:
-        number = np.floor(elevation_rad / ELEVATION_STEP_RAD).astype(np.int64)
+        number = np.floor(_elevations_rad(own_m) / ELEVATION_STEP_RAD).astype(np.int64)
         return number - int(number.min())
-    count = np.bincount(number)
-    mean_rad = np.bincount(number, weights=elevation_rad) / np.maximum(count, 1)
-    order = np.argsort(np.where(count > 0, mean_rad, np.inf), kind="stable")
+    rings = int(number.max()) + 1
+    count = np.bincount(number[::SAMPLED_EVERY], minlength=rings)
+    total_rad = np.bincount(number[::SAMPLED_EVERY], _elevations_rad(own_m[::SAMPLED_EVERY]), minlength=rings)
+    order = np.argsort(np.where(count > 0, total_rad / np.maximum(count, 1), np.inf), kind="stable")
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))
     return rank[number]
+
+
+def _elevations_rad(own_m: Floats) -> Floats:
+    elevation_rad: Floats = np.arctan2(own_m[:, 2], np.hypot(own_m[:, 0], own_m[:, 1]))
+    return elevation_rad

@@ -90,7 +90,7 @@ OPTIMISATION = Grant(
         "map/*/version",
         "veh/*/corr/**",
     ),
-    listen=("veh/*/obs/**", "veh/*/est/**", "map/**"),
+    listen=("veh/*/obs/**", "veh/*/est/**", "veh/*/perc/**", "map/**"),
     claim=("live/optimisation/**",),
     watch=("live/**",),
     hear_of=("**",),

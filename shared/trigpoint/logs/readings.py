@@ -1,28 +1,26 @@
 """What a log holds, folded into the values services work on: frame, drives, anchors, verdicts, map versions."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable
 from typing import cast
 
 from trigpoint.errors import InputError
 from trigpoint.events.corrected import AnchorLabelled, Corrected, anchors_in_force, excluded_drives
 from trigpoint.events.drives import DRIVE_KINDS, Drive, drives_of
-from trigpoint.events.envelope import Envelope, EventIdentity
+from trigpoint.events.envelope import Envelope
 from trigpoint.events.estimated import FixJudged
 from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.mapped import Mapped, MapSolved
 from trigpoint.events.observed import MapFramePinned, Observed, VehicleDescribed
-from trigpoint.events.perceived import LandmarksPerceived
-from trigpoint.events.perceived_detections import detected_in
 from trigpoint.events.solved import SolvedMap, closed_versions, solved_maps
 from trigpoint.geodesy.positions import GridPosition
 from trigpoint.geodesy.projection import MapFrame, pin_map_frame
+from trigpoint.logs.perceived_readings import perceived_sweeps
 from trigpoint.logs.ports import EventLog
 
 Progress = Callable[[int, int], None]
 
 VEHICLE_PREFIX = STREAM_PATTERNS[VehicleDescribed].partition("{")[0]
 FRAME_STREAM, MAPPED_STREAM = STREAM_PATTERNS[MapFramePinned], STREAM_PATTERNS[MapSolved]
-PERCEIVED_STREAM = STREAM_PATTERNS[LandmarksPerceived]
 LABEL_STREAM, VERDICT_STREAM = STREAM_PATTERNS[AnchorLabelled], STREAM_PATTERNS[FixJudged]
 PROGRESS_COUNT = 5000  # events between two calls
 
@@ -60,12 +58,14 @@ def drives_of_vehicle(log: EventLog, vehicle: str) -> tuple[Drive, ...]:
         raise InputError(f"vehicle {vehicle!r} has no drive in the log; these have: {known}")
     logged = log.read(f"{VEHICLE_PREFIX}{vehicle}", kinds=DRIVE_KINDS)
     rows = [cast(Envelope[Observed], row.envelope) for row in logged]
-    return drives_of([*rows, *_perceived(log, rows)])
+    return drives_of([*rows, *perceived_sweeps(log, _descriptions(rows))])
 
 
 def logged_drives(log: EventLog, *, progress: Progress = in_silence) -> tuple[Drive, ...]:
-    """Every drive in the log that is not excluded, with what perception found in its sweeps. Raises InputError where
-    there is none."""
+    """Every drive in the log that is not excluded, what was perceived in its sweeps among its detections.
+
+    Raises InputError where there is none.
+    """
     streams, excluded = vehicle_streams(log), excluded_drives(logged_corrections(log))
     total = sum(log.next_number(stream) for stream in streams)
     rows: list[Envelope[Observed]] = []
@@ -78,22 +78,19 @@ def logged_drives(log: EventLog, *, progress: Progress = in_silence) -> tuple[Dr
     if not rows:
         raise InputError(_without_drive(total, len(excluded)))
     progress(total, total)
-    return drives_of([*rows, *_perceived(log, rows)])
+    return drives_of([*rows, *perceived_sweeps(log, _descriptions(rows))])
 
 
-def _perceived(log: EventLog, rows: Sequence[Envelope[Observed]]) -> Iterator[Envelope[Observed]]:
-    """What perception found in sweeps of these drives, as detections under the sweeps' identities."""
+def _descriptions(rows: Iterable[Envelope[Observed]]) -> dict[tuple[str, str], VehicleDescribed]:
+    """How each drive's vehicle is described, all-zero where it is not."""
     described: dict[tuple[str, str], VehicleDescribed] = {}
     for row in rows:
-        unknown = VehicleDescribed(vehicle=row.identity.source)
-        drive = (row.identity.source, row.identity.boot_id)
-        described[drive] = row.event if isinstance(row.event, VehicleDescribed) else described.get(drive, unknown)
-    for logged in log.read(PERCEIVED_STREAM, kinds=(LandmarksPerceived,)):
-        event = cast(LandmarksPerceived, logged.envelope.event)
-        drive = (event.vehicle, event.boot_id)
-        if drive in described and event.landmarks:
-            sweep = EventIdentity(*drive, event.sweep_sequence)
-            yield Envelope(sweep, logged.envelope.stamp_ns, detected_in(event, described[drive]))
+        name = (row.identity.source, row.identity.boot_id)
+        if isinstance(row.event, VehicleDescribed):
+            described[name] = row.event
+        elif name not in described:
+            described[name] = VehicleDescribed(vehicle=name[0])
+    return described
 
 
 def _without_drive(total: int, excluded: int) -> str:

@@ -13,10 +13,10 @@ from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.mapped import LandmarkSolved
 from trigpoint.events.observed import LandmarkDetection, LandmarksDetected, VehicleDescribed
 from trigpoint.events.perceived import LandmarksPerceived, PerceivedLandmark
-from trigpoint.events.perceived_detections import detected_in
 from trigpoint.landmarks.memory_store import MemoryStore
 from trigpoint.logs.memory_log import MemoryLog
-from trigpoint.logs.readings import PERCEIVED_STREAM, logged_drives, logged_maps
+from trigpoint.logs.perceived_readings import PERCEIVED_STREAM, detected_in
+from trigpoint.logs.readings import logged_drives, logged_maps
 from trigpoint_evaluation.explaining import explained
 from trigpoint_landmarks.app import project
 from trigpoint_optimisation.app import build, input_positions
