@@ -182,9 +182,8 @@ def _seen(log: EventLog, row: Landmark, drive: DriveName, sweeps: Sequence[int],
         if ((event := cast(LandmarksPerceived, logged.envelope.event)).vehicle, event.boot_id) == drive
     )
     path = parts.paths.get(drive)
-    return [
-        _sighting(swept, row, path, drive, described) for swept in (*detected, *perceived) if swept.sequence in wanted
-    ]
+    last = {swept.sequence: swept for swept in (*detected, *perceived) if swept.sequence in wanted}
+    return [_sighting(swept, row, path, drive, described) for swept in last.values()]
 
 
 @dataclass(frozen=True, slots=True)

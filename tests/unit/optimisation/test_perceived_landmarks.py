@@ -1,7 +1,6 @@
 """What perception found in points is solved as what a landmark sensor detected."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,8 +14,8 @@ from trigpoint.events.observed import LandmarkDetection, LandmarksDetected, Vehi
 from trigpoint.events.perceived import LandmarksPerceived, PerceivedLandmark
 from trigpoint.landmarks.memory_store import MemoryStore
 from trigpoint.logs.memory_log import MemoryLog
-from trigpoint.logs.perceived_readings import PERCEIVED_STREAM, detected_in
-from trigpoint.logs.readings import logged_drives, logged_maps
+from trigpoint.logs.perceived_readings import PERCEIVED_STREAM
+from trigpoint.logs.readings import logged_maps
 from trigpoint_evaluation.explaining import explained
 from trigpoint_landmarks.app import project
 from trigpoint_optimisation.app import build, input_positions
@@ -110,29 +109,3 @@ def test_behind_a_landmark_stands_what_perception_said(perceived: MemoryLog) -> 
     assert (seen, found.missing) == (set(landmark.observations), 0)
     assert {one.position.stream for one in found.sightings} == {PERCEIVED_STREAM}
     assert max(one.off_m for one in found.sightings if one.off_m is not None) < 1.0
-
-
-def test_what_was_found_in_an_unknown_drive_or_in_an_unusable_sweep_makes_no_detection(perceived: MemoryLog) -> None:
-    (row, *_) = (logged.envelope for logged in perceived.read(PERCEIVED_STREAM))
-    assert isinstance(row.event, LandmarksPerceived)
-    log = MemoryLog()
-    for stream in perceived.streams():
-        if stream != PERCEIVED_STREAM:
-            log.append(stream, [logged.envelope for logged in perceived.read(stream)])
-    strange = replace(row.event, vehicle="nobody"), replace(row.event, landmarks=(), refusal="no point")
-    log.append(PERCEIVED_STREAM, [replace(row, event=event) for event in strange])
-    assert [len(drive.detections.range_m) for drive in logged_drives(log)] == [0, 0]
-
-
-def test_range_and_bearing_are_from_the_landmark_sensor() -> None:
-    described = VehicleDescribed(
-        vehicle="car", landmark_sensor_x_m=2.0, landmark_sensor_y_m=1.0, landmark_sensor_yaw_rad=math.pi / 2
-    )
-    ahead = in_base(LandmarkDetection(5.0, -math.pi / 2, "pole", "", 0.2), described)
-    assert (ahead.x_m, ahead.y_m) == pytest.approx((7.0, 1.0))
-    event = LandmarksPerceived(
-        vehicle="car", boot_id="b", sensor="roof", sweep_sequence=0, refusal="", landmarks=(ahead,)
-    )
-    (seen,) = detected_in(event, described).detections
-    assert [seen.range_m, seen.bearing_rad] == pytest.approx([5.0, -math.pi / 2])
-    assert (seen.kind, seen.diameter_m) == ("pole", 0.2)
