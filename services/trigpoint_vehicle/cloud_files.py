@@ -2,6 +2,7 @@
 
 import csv
 import io
+import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,7 +17,7 @@ from trigpoint.events.envelope import Envelope
 from trigpoint.events.observed import Observed
 from trigpoint.events.packed_points import PackedPoints, unpacked_points
 from trigpoint.events.scanned import PointsScanned
-from trigpoint_vehicle.cloud_conversion import LeftAside, writable
+from trigpoint_vehicle.cloud_conversion import POINTS_LIMIT, LeftAside, writable
 from trigpoint_vehicle.core.kitti import bin_points
 from trigpoint_vehicle.core.mountings import Mounting
 from trigpoint_vehicle.core.pcd import pcd_points
@@ -26,7 +27,6 @@ from trigpoint_vehicle.core.scan_rows import LISTED_COLUMNS, ScanRow, ScanSource
 from trigpoint_vehicle.core.text_tables import SourceText
 
 NS_PER_S = 1_000_000_000
-LAS_LIMIT = 10_000_000  # points of a file that is read
 GPS_TIME = "gps_time"
 
 Floats = NDArray[np.float64]
@@ -133,8 +133,10 @@ def _las_points(path: Path, source: ScanSource) -> PackedPoints:
 def _las(path: Path) -> _Las:
     try:
         with laspy.open(path) as file:
-            if file.header.point_count > LAS_LIMIT:
-                raise InputError(f"{path}: {file.header.point_count} points, limit {LAS_LIMIT}")
+            if file.header.point_count > POINTS_LIMIT:
+                raise InputError(f"{path}: {file.header.point_count} points, limit {POINTS_LIMIT}")
+            if file.header.are_points_compressed:
+                _require_chunks(path, file.header)
             read = file.read()
     except (laspy.errors.LaspyException, ValueError, RuntimeError, EOFError) as error:
         raise InputError(f"{path}: no LAS or LAZ file that can be read: {error}") from error
@@ -144,6 +146,22 @@ def _las(path: Path) -> _Las:
         intensity=np.asarray(read.intensity, dtype=np.float32),
         time_s=np.asarray(read.gps_time, dtype=np.float64) if has_time else None,
     )
+
+
+def _require_chunks(path: Path, header: laspy.LasHeader) -> None:
+    """Nothing, if a LAZ file's table of chunks has no more of them than points: the library makes room for what that
+    says before it reads any (LASzip's format: the table's place, then its version and its length)."""
+    with path.open("rb") as file:
+        file.seek(header.offset_to_point_data)
+        place = int.from_bytes(file.read(8), "little", signed=True)
+        if place < 0:  # it was written to a stream, and the place stands at the file's end
+            file.seek(-8, os.SEEK_END)
+            place = int.from_bytes(file.read(8), "little", signed=True)
+        file.seek(place)
+        head = file.read(8)
+    count = int.from_bytes(head[4:], "little")
+    if len(head) < 8 or count > max(header.point_count, 1):
+        raise InputError(f"{path}: a table of {count} chunks for {header.point_count} points")
 
 
 def _columns(point_m: NDArray[np.float32], intensity: NDArray[np.float32], offset_s: Floats) -> PackedPoints:

@@ -32,6 +32,8 @@ wheel_speeds = { time = "t", speed = { column = "v", unit = "km/h" }, steering =
 detections = { time = "t", range = "r", bearing = { column = "b", unit = "deg" }, kind = { value = "pole" } }
 """
 CONFIGURATION = b'[fleet]\nroot = "depot"\n[ingest]\nbatch_count = 100\n[bus]\nlisten = ["tcp/127.0.0.1:0"]\n'
+PCD = b"VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\nPOINTS 1\n"
+PACKED = b"DATA binary_compressed\n" + bytes([7, 0, 0, 0, 12, 0, 0, 0, 3, 1, 2, 3, 4, 192, 3])
 DEEP, ENDLESS = b"[" * 3000, b"9" * 5000
 
 
@@ -51,6 +53,7 @@ def seeds(folder: Path) -> dict[str, tuple[bytes, ...]]:
         "tile's change": (tile_change_bytes(TILE_CHANGE),),
         "table manifest": (MANIFEST, b"vehicle = " + DEEP, b"vehicle = " + ENDLESS),
         "spool": (_spool(),),
+        "PCD scan": (PCD + b"DATA ascii\n1 2 3\n", PCD + b"DATA binary\n" + bytes(12), PCD + PACKED),
         "log file": (_log_file(folder / "seed.mcap"),),
         "GeoJSON anchors": (_geojson(), DEEP),
         "CSV anchors": (

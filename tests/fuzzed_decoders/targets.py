@@ -14,6 +14,7 @@ from trigpoint.bus.register import read_register
 from trigpoint.configuration.given import from_environment
 from trigpoint.errors import InputError
 from trigpoint.events.codec import decode, encode, event_classes, schema_name
+from trigpoint.events.packed_points import unpacked_points
 from trigpoint.geodesy.web_tiles import WebTile
 from trigpoint.landmarks.asked import LandmarkQuestion
 from trigpoint.landmarks.messages import (
@@ -31,6 +32,7 @@ from trigpoint.logs.verification import verify
 from trigpoint_cli.settings import configured_settings
 from trigpoint_ingest.anchor_files import read_anchor_file
 from trigpoint_landmarks.core.questions import bbox_of, near_of
+from trigpoint_vehicle.core.pcd import pcd_points
 from trigpoint_vehicle.core.spool_walk import contents_of
 from trigpoint_vehicle.core.table_manifest import parsed_manifest
 
@@ -149,6 +151,11 @@ def _log_file(data: bytes, path: Path) -> None:
     assert len(list(read_vehicle_log(path))) == len(whole)
 
 
+def _pcd(data: bytes) -> None:
+    packed = pcd_points("scan.pcd", data)
+    unpacked_points(packed.fields, packed.data, stride=packed.stride)
+
+
 def _of_file(read: Callable[[bytes, Path], None], path: Path) -> Callable[[bytes], None]:
     return lambda data: read(data, path)
 
@@ -178,6 +185,7 @@ def decoders(folder: Path) -> tuple[Decoder, ...]:
         Decoder(name="tile's change", decode=_tile_change),
         Decoder(name="table manifest", decode=_manifest),
         Decoder(name="spool", decode=_spool),
+        Decoder(name="PCD scan", decode=_pcd),
         Decoder(name="configuration's words", decode=_configuration_words),
         *(Decoder(name=name, decode=_of_file(read, folder / file)) for name, read, file in files),
     )

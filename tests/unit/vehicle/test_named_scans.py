@@ -127,6 +127,18 @@ def test_a_las_files_points_are_taken_from_its_origin_with_their_times(tmp_path:
     assert (sweep.intensity.tolist(), sweep.offset_ns.tolist()) == ([700.0, 800.0], [0, 250_000_000])
 
 
+def test_a_laz_file_that_asks_for_too_much_is_left_aside(tmp_path: Path) -> None:
+    content = bytearray(las(tmp_path / "a.laz", time_s=(1.0, 1.1)).read_bytes())
+    with laspy.open(tmp_path / "a.laz") as file:
+        begin = file.header.offset_to_point_data
+    table = int.from_bytes(content[begin : begin + 8], "little")
+    content[table + 4 : table + 8] = b"\xff" * 4  # the number of its chunks
+    (tmp_path / "a.laz").write_bytes(content)
+    (tmp_path / "stamps.csv").write_text("t,scan\n1,a.laz\n")
+    written, _ = converted(drive(tmp_path, 'file = "stamps.csv"\ntime = "t"'))
+    assert "a table of 4294967295 chunks for 2 points" in written.left_aside.complaints()[0]
+
+
 def test_a_las_file_that_takes_minutes_is_no_scan_of_its_points_times(tmp_path: Path) -> None:
     las(tmp_path / "a.las", time_s=(1000.0, 1060.0))
     (tmp_path / "stamps.csv").write_text("t,scan\n1,a.las\n")
