@@ -44,7 +44,7 @@ class _Driven:
 @click.option("--vehicles", type=int, default=2, show_default=True, metavar="N", help="How many drive there.")
 @click.option("--known-signatures", is_flag=True, help="Detections and labels say which landmark they are of.")
 @click.option("--aerial", is_flag=True, help=f"Aerial pictures of it too, and DIR/{VIEWER}, which shows them.")
-@click.option("--lidar", is_flag=True, help="Vehicles carry a lidar: some 300 MB of points a kilometre.")
+@click.option("--lidar", is_flag=True, help="Vehicles carry a lidar: some 500 MB of points a kilometre.")
 @click.option("--points-only", is_flag=True, help="With --lidar: no simulated detections, points only.")
 @answering
 def command(out: Path, *, aerial: bool, screen: Screen, **simulated: Any) -> Answer:

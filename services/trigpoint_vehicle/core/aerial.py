@@ -13,8 +13,8 @@ from trigpoint_vehicle.core.campus import Campus
 from trigpoint_vehicle.core.campus_settings import CampusSettings
 from trigpoint_vehicle.core.scene.buildings import away_from_street, footprint_m
 from trigpoint_vehicle.core.scene.furniture import Trees
-from trigpoint_vehicle.core.scene.ground import KERB_WIDTH_M
-from trigpoint_vehicle.core.scene.markings import marking_corners_m
+from trigpoint_vehicle.core.scene.ground import KERB_WIDTH_M, STREET_HALF_M
+from trigpoint_vehicle.core.scene.markings import marking_corners_m, whole_length
 from trigpoint_vehicle.core.scene.world import Scene
 
 Floats = NDArray[np.float64]
@@ -78,7 +78,6 @@ class _Drawing:
         extent_m = np.array([settings.streets.width_m, settings.streets.height_m])
         side_m = extent_m / (settings.imagery.columns, settings.imagery.rows)
         low_m, high_m = cell * side_m - AROUND_M, (cell + 1) * side_m + AROUND_M
-        self._middle = 0.0 if scene is None else 0.5
         self._ground_m = np.array([low_m, (high_m[0], low_m[1]), high_m, (low_m[0], high_m[1])])
         corners = self._world_pixels(self._ground_m)
         self._first = np.floor(corners.min(axis=0) / TILE_PIXELS).astype(int)
@@ -90,11 +89,10 @@ class _Drawing:
         """The picture drawn."""
         canvas = self._grass(random)
         draw = ImageDraw.Draw(canvas)
-        if self._scene is not None:
-            self._draw_carriageways(draw, KERB_STONE, STREET_M + 2.0 * KERB_WIDTH_M)
-        self._draw_carriageways(draw, ASPHALT, STREET_M)
-        if self._scene is not None:
-            self._draw_markings(draw, self._scene)
+        if self._scene is None:
+            self._draw_streets(draw)
+        else:
+            self._draw_carriageways(draw, self._scene)
         self._draw_landmarks(draw)
         ground = Image.new("L", canvas.size, 0)
         ImageDraw.Draw(ground).polygon(self._pixels(self._ground_m), fill=255)
@@ -111,19 +109,28 @@ class _Drawing:
         width, height = self._size.tolist()
         return Image.fromarray(colours).resize((width, height), Image.Resampling.BICUBIC).convert("RGBA")
 
-    def _draw_carriageways(self, draw: ImageDraw.ImageDraw, colour: Colour, width_m: float) -> None:
-        streets, width = self._campus.streets, round(width_m * self._pixels_per_m)
+    def _draw_streets(self, draw: ImageDraw.ImageDraw) -> None:
+        streets, width = self._campus.streets, round(STREET_M * self._pixels_per_m)
         for begin, end in streets.street:
             line = self._pixels(streets.junction_m[[begin, end]] + self._shift_m)
-            draw.line(line, fill=colour, width=width)
+            draw.line(line, fill=ASPHALT, width=width)
             for x, y in line:
-                draw.ellipse(_around(x, y, width / 2), fill=colour)
+                draw.ellipse(_around(x, y, width / 2), fill=ASPHALT)
 
-    def _draw_markings(self, draw: ImageDraw.ImageDraw, scene: Scene) -> None:
-        corners_m = marking_corners_m(scene.ground.street, scene.ground.stripe) * scene.scale
+    def _draw_carriageways(self, draw: ImageDraw.ImageDraw, scene: Scene) -> None:
+        """Kerbs, carriageways and markings, all as polygons: Pillow draws wide lines up to a pixel aside."""
+        ends_m = scene.ground.street.reshape(-1, 2) * scene.scale + self._shift_m
+        for colour, half_m in ((KERB_STONE, STREET_HALF_M + KERB_WIDTH_M), (ASPHALT, STREET_HALF_M)):
+            self._draw_pieces(draw, scene, whole_length(half_m), colour)
+            for x, y in self._pixels(ends_m):
+                draw.ellipse(_around(x, y, half_m * self._pixels_per_m), fill=colour)
+        self._draw_pieces(draw, scene, scene.ground.stripe, WHITE)
+
+    def _draw_pieces(self, draw: ImageDraw.ImageDraw, scene: Scene, stripe: Floats, colour: Colour) -> None:
+        corners_m = marking_corners_m(scene.ground.street, stripe) * scene.scale
         at = np.array(self._pixels(corners_m.reshape(-1, 2) + self._shift_m)).reshape(-1, 4, 2)
         for corners in at.tolist():
-            draw.polygon([tuple(corner) for corner in corners], fill=WHITE)
+            draw.polygon([tuple(corner) for corner in corners], fill=colour)
 
     def _draw_landmarks(self, draw: ImageDraw.ImageDraw) -> None:
         landmarks = self._campus.landmarks
@@ -163,8 +170,8 @@ class _Drawing:
         return np.column_stack(tile_coordinates(lat_deg, lon_deg, ZOOM_MOST)) * TILE_PIXELS
 
     def _pixels(self, point_m: Floats) -> list[tuple[float, float]]:
-        """Where points (n, 2) of the map frame are on the canvas; a drawing's whole numbers are the pixels' middles."""
-        at = self._world_pixels(point_m) - self._first * TILE_PIXELS - self._middle
+        """Where points (n, 2) of the map frame are on the canvas."""
+        at = self._world_pixels(point_m) - self._first * TILE_PIXELS
         return [(float(x), float(y)) for x, y in at]
 
 

@@ -125,7 +125,7 @@ def test_a_lidar_s_markings_are_seen_from_above_where_they_are_painted(
     corner_m = marking_corners_m(scene.ground.street[:1], scene.ground.stripe) * scene.scale  # a street in the west
     wide = np.hypot(*(corner_m[:, 2] - corner_m[:, 1]).T) > 0.45  # bars of crossings: four pixels
     seen = [pixel(scanned_tiles, campus, one + campus.imagery.offset_m[0]) for one in corner_m[wide].mean(axis=1)]
-    assert len(seen) == 14
+    assert len(seen) == 16  # and two stop lines
     assert set(seen) == {WHITE}
 
 

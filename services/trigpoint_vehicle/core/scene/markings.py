@@ -28,6 +28,11 @@ STRIPES: Floats = np.array(
 )
 
 
+def whole_length(half_m: float) -> Floats:
+    """The table (1, 6) of one strip over a street's whole length, so wide to either side of its middle."""
+    return np.array([(0.0, -1e-9, SOLID_M, SOLID_M, -half_m, half_m)])
+
+
 def _bounds_m(stripe: Floats, length_m: float) -> Floats:
     # (k, 4) from, to along and across of every painted piece of one street
     pieces = []
