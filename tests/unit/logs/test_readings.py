@@ -9,7 +9,7 @@ from trigpoint.events.corrected import AnchorRetracted, Corrected, DriveExcluded
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.logs.memory_log import MemoryLog
 from trigpoint.logs.readings import logged_anchors, logged_drives, logged_maps
-from trigpoint_optimisation.resuming import resumed
+from trigpoint_optimisation.resuming import needed_of, resumed
 
 
 def _log_of(*corrections: Corrected) -> MemoryLog:
@@ -68,4 +68,4 @@ def test_what_a_solve_left_that_was_cut_off_is_in_no_map_version() -> None:
     append_mapped(log, solved_map(2, [solved_landmark("L1", 3.0, 0.0, map_version=2)]), boot_id="boot-2")
     _, newest = logged_maps(log)
     assert [(one.landmark, one.position_m[0]) for one in newest.landmarks] == [("L1", 3.0)]
-    assert list(resumed(log).landmarks) == list(newest.landmarks)
+    assert list(resumed(log).landmarks) == [needed_of(one) for one in newest.landmarks]
