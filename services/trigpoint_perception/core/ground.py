@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from trigpoint_perception.core.compiled import compiled
+from trigpoint.compiled import compiled
 from trigpoint_perception.core.sweep import Sweep
 from trigpoint_perception.settings import GroundSettings
 

@@ -9,8 +9,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from trigpoint.compiled import compiled
 from trigpoint_perception.core.circle import Arc, Circle, fitted_circle
-from trigpoint_perception.core.compiled import compiled
 from trigpoint_perception.core.segments import OrderedSweep, Segments
 from trigpoint_perception.settings import PoleSettings
 

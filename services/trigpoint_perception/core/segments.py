@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trigpoint_perception.core.compiled import compiled
+from trigpoint.compiled import compiled
 from trigpoint_perception.core.sweep import Sweep
 
 Floats = NDArray[np.float64]

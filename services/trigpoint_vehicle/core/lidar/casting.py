@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trigpoint_vehicle.core.compiled import compiled
+from trigpoint.compiled import compiled
 from trigpoint_vehicle.core.lidar.hits import (
     GROUND_REACH_M,
     Foot,

@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from trigpoint_vehicle.core.compiled import compiled
+from trigpoint.compiled import compiled
 from trigpoint_vehicle.core.scene.ground import (
     GRASS,
     KERB,

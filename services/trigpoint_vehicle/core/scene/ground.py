@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trigpoint_vehicle.core.compiled import compiled
+from trigpoint.compiled import compiled
 from trigpoint_vehicle.core.lidar_settings import GroundSettings
 from trigpoint_vehicle.core.scene.materials import Material
 from trigpoint_vehicle.core.streets import Streets

@@ -1,4 +1,4 @@
-"""Loops over rays, compiled: numba's decorator with the types of what it decorates."""
+"""Loops over points and rays, compiled when they are first called: numba's one home."""
 
 from collections.abc import Callable
 from typing import TypeVar, cast
@@ -9,5 +9,6 @@ FunctionT = TypeVar("FunctionT", bound=Callable[..., object])
 
 
 def compiled(function: FunctionT) -> FunctionT:
-    """The function as machine code, kept beside its source for the next process; other threads run meanwhile."""
+    """The function as machine code, kept beside its source from one process to the next; threads run it side by
+    side."""
     return cast(FunctionT, numba.njit(cache=True, nogil=True)(function))
