@@ -1,5 +1,6 @@
 """Rasters as GeoTIFF: written cloud optimised from tiles, read on any grid. rasterio's one home."""
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from rasterio.enums import Resampling
 from rasterio.errors import RasterioError
 from rasterio.transform import Affine, from_origin
-from rasterio.warp import calculate_default_transform, reproject
+from rasterio.warp import calculate_default_transform, reproject, transform_bounds
 from rasterio.windows import Window
 
 from trigpoint.durable_files import replaced_durably
@@ -21,6 +22,7 @@ from trigpoint_tiles.core.rendering import BANDS, Bands
 
 Floats = NDArray[np.float64]
 
+MARGIN_PX = 4  # more than a cubic looks at
 CACHE_BYTES = 64 * 1024**2  # of GDAL's blocks
 WORKING = {"driver": "GTiff", "dtype": "float32", "tiled": True, "compress": "zstd", "zstd_level": 1}
 OPTIMISED = {"compress": "DEFLATE", "predictor": "YES", "blocksize": 512, "bigtiff": "IF_SAFER"}
@@ -73,6 +75,26 @@ class RasterPlace:
     pixel_m: float
     columns: int
     rows: int
+
+    def within(self, bounds: tuple[float, float, float, float]) -> "RasterPlace":
+        """The part of it inside bounds: west, south, east, north in grid metres; of no pixel where there is none."""
+        west, south, east, north = bounds
+        left, top = (max(round(off_m / self.pixel_m), 0) for off_m in (west - self.left_m, self.top_m - north))
+        right, bottom = round((east - self.left_m) / self.pixel_m), round((self.top_m - south) / self.pixel_m)
+        return RasterPlace(
+            crs=self.crs,
+            left_m=self.left_m + left * self.pixel_m,
+            top_m=self.top_m - top * self.pixel_m,
+            pixel_m=self.pixel_m,
+            columns=max(min(right, self.columns) - left, 0),
+            rows=max(min(bottom, self.rows) - top, 0),
+        )
+
+    @property
+    def bounds_m(self) -> tuple[float, float, float, float]:
+        """West, south, east and north in grid metres."""
+        east_m, south_m = self.left_m + self.columns * self.pixel_m, self.top_m - self.rows * self.pixel_m
+        return self.left_m, south_m, east_m, self.top_m
 
     @property
     def transform(self) -> Affine:
@@ -133,6 +155,14 @@ class RasterFile:
         """How many bands it has."""
         return int(self._raster.count)
 
+    def bounds_on(self, place: RasterPlace) -> tuple[float, float, float, float]:
+        """West, south, east and north in the metres of another raster's grid. Raises InputError as `read_on` does."""
+        try:
+            west, south, east, north = transform_bounds(self._raster.crs, place.crs, *self._raster.bounds)
+        except RasterioError as error:
+            raise InputError(f"{self.path}: cannot be brought onto the other's pixels: {error}") from error
+        return float(west), float(south), float(east), float(north)
+
     def ground_pixel_m(self, place: RasterPlace) -> float:
         """The side of a pixel, in the metres of another raster's grid. Raises InputError as `read_on` does."""
         raster = self._raster
@@ -151,17 +181,33 @@ class RasterFile:
         Raises InputError where the two CRS have no known relation.
         """
         found = np.full((len(bands), place.rows, place.columns), np.nan)
-        resampling = Resampling.average if mean else Resampling.cubic
         try:
-            for at, band in enumerate(bands):
+            source, transform = self._around(place, bands)
+            for at in range(len(bands)):
                 reproject(
-                    rasterio.band(self._raster, band),
+                    source[at],
                     found[at],
+                    src_transform=transform,
+                    src_crs=self._raster.crs,
+                    src_nodata=np.nan,
                     dst_transform=place.transform,
                     dst_crs=place.crs,
                     dst_nodata=np.nan,
-                    resampling=resampling,
+                    resampling=Resampling.average if mean else Resampling.cubic,
                 )
         except RasterioError as error:
             raise InputError(f"{self.path}: cannot be brought onto the other's pixels: {error}") from error
         return found
+
+    def _around(self, place: RasterPlace, bands: tuple[int, ...]) -> tuple[Floats, Affine]:
+        """The file's own pixels around a place, (n, rows, columns), NaN where none of its bands has data."""
+        raster = self._raster
+        bounds = transform_bounds(place.crs, raster.crs, *place.bounds_m)
+        near = raster.window(*bounds)
+        left, top = math.floor(near.col_off) - MARGIN_PX, math.floor(near.row_off) - MARGIN_PX
+        right, bottom = (math.ceil(end) + MARGIN_PX for end in (near.col_off + near.width, near.row_off + near.height))
+        left, top, right, bottom = max(left, 0), max(top, 0), min(right, raster.width), min(bottom, raster.height)
+        window = Window(left, top, max(right - left, 1), max(bottom - top, 1))
+        pixels = raster.read(bands, window=window).astype(np.float64)
+        pixels[:, raster.dataset_mask(window=window) == 0] = np.nan
+        return pixels, raster.window_transform(window)

@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 
 TILE_M = 50.0  # a tile's side: large enough for edges in every direction, small enough for a stitched image's seams
 PIXEL_LEAST_M, PIXEL_MOST_M = 0.1, 0.5  # finer tells nothing more, coarser hides kerbs and markings
+MEAN_FROM = 1.5  # pixels in one a side, from which their mean is taken
 COVERED_LEAST = 0.1  # of a tile, by both
 COLOURS = 3  # an image's first bands; what follows is alpha or infrared
 
@@ -54,18 +55,23 @@ def register_image(ortho: Path, image: Path) -> ImageRegistration:
     with closing(RasterFile(ortho)) as layer, closing(RasterFile(image)) as picture:
         reflectivity, height = _band(layer, BANDS[REFLECTIVITY].name), _band(layer, BANDS[HEIGHT_ABOVE_M].name)
         whole = layer.place
-        pixel_m = float(np.clip(max(whole.pixel_m, picture.ground_pixel_m(whole)), PIXEL_LEAST_M, PIXEL_MOST_M))
-        side_px = max(round(TILE_M / pixel_m), side_least_px(pixel_m))
+        pixel_m = whole.pixel_m * _pixels_in_one(whole.pixel_m, picture.ground_pixel_m(whole))
         bands = tuple(range(1, min(picture.band_count, COLOURS) + 1))
         tiles = []
-        for place in _places(whole, pixel_m, side_px):
-            shown = picture.read_on(place, bands, mean=pixel_m > picture.ground_pixel_m(whole))
-            seen = layer.read_on(place, (reflectivity, height), mean=pixel_m > whole.pixel_m)
+        for place in _places(whole.within(picture.bounds_on(whole)), pixel_m):
+            shown = picture.read_on(place, bands, mean=pixel_m > MEAN_FROM * picture.ground_pixel_m(whole))
+            seen = layer.read_on(place, (reflectivity, height), mean=pixel_m > MEAN_FROM * whole.pixel_m)
             if min(np.isfinite(seen[0]).mean(), np.isfinite(shown[0]).mean()) >= COVERED_LEAST:
                 tiles.append(_registered(place, seen, shown))
     if not tiles:
         raise InputError(f"{image} and {ortho} have no tile of {TILE_M:g} m that both cover to {COVERED_LEAST:.0%}")
     return _joined(pixel_m, tuple(tiles))
+
+
+def _pixels_in_one(layer_m: float, image_m: float) -> int:
+    """How many of the layer's pixels a side make one to register on: about as coarse as the image's."""
+    wanted_m = min(max(layer_m, image_m, PIXEL_LEAST_M), PIXEL_MOST_M)
+    return max(1, round(wanted_m / layer_m))
 
 
 def _band(layer: RasterFile, name: str) -> int:
@@ -75,24 +81,21 @@ def _band(layer: RasterFile, name: str) -> int:
     return layer.names.index(name) + 1
 
 
-def _places(whole: RasterPlace, pixel_m: float, side_px: int) -> Iterator[RasterPlace]:
-    """The layer cut into squares; the last ones of a row or column end where it ends, over part of those before."""
-    columns, rows = round(whole.columns * whole.pixel_m / pixel_m), round(whole.rows * whole.pixel_m / pixel_m)
-    for top in _starts(rows, side_px):
-        for left in _starts(columns, side_px):
-            yield RasterPlace(
-                crs=whole.crs,
-                left_m=whole.left_m + left * pixel_m,
-                top_m=whole.top_m - top * pixel_m,
-                pixel_m=pixel_m,
-                columns=min(side_px, columns),
-                rows=min(side_px, rows),
-            )
-
-
-def _starts(length: int, side: int) -> list[int]:
-    starts = list(range(0, max(length - side, 0) + 1, side))
-    return [*starts, length - side] if length - side > starts[-1] else starts
+def _places(shared: RasterPlace, pixel_m: float) -> Iterator[RasterPlace]:
+    """The ground both cover, cut into tiles of about the same size."""
+    side_px = max(TILE_M / pixel_m, side_least_px(pixel_m))
+    columns, rows = shared.columns * shared.pixel_m / pixel_m, shared.rows * shared.pixel_m / pixel_m
+    across, down = max(1, round(columns / side_px)), max(1, round(rows / side_px))
+    for number in range(across * down):
+        left, top = number % across * int(columns / across), number // across * int(rows / down)
+        yield RasterPlace(
+            crs=shared.crs,
+            left_m=shared.left_m + left * pixel_m,
+            top_m=shared.top_m - top * pixel_m,
+            pixel_m=pixel_m,
+            columns=int(columns / across),
+            rows=int(rows / down),
+        )
 
 
 def _registered(place: RasterPlace, seen: Floats, shown: Floats) -> TileRegistration:

@@ -31,7 +31,7 @@ def edge_directions(layers: Sequence[Floats], *, sigma_px: float) -> Complexes:
     as length.
 
     Normalised gradients (Haber and Modersitzki 2006) with doubled angle: the real part of one field times the other's
-    conjugate is highest where edges are parallel, of whichever sign. A layer's own median gradient is its noise.
+    conjugate is highest where edges are parallel, of whichever sign. As there, a layer's mean gradient is its noise.
     """
     field = np.zeros(layers[0].shape, dtype=np.complex128)
     for layer in layers:
@@ -45,6 +45,6 @@ def _directions(layer: Floats, *, sigma_px: float) -> Complexes:
     inside = ndimage.binary_erosion(seen)
     squared = (right + 1j * down) ** 2
     clear = np.abs(squared)
-    noise = float(np.median(clear[inside])) if inside.any() else 0.0
+    noise = float(np.sqrt(clear[inside]).mean()) ** 2 if inside.any() else 0.0
     unit = np.where(inside & (clear > 0.0), squared / np.maximum(clear + noise, np.finfo(np.float64).tiny), 0.0)
     return np.asarray(unit, dtype=np.complex128)
