@@ -9,8 +9,8 @@ from scipy import ndimage
 
 from trigpoint.events.scanned import PointsScanned
 from trigpoint_tiles.core.cells import FIELDS, Cells
-from trigpoint_tiles.core.gathering import LEFT_OUT, RangeLimits, Target, gather, no_tally
-from trigpoint_tiles.core.grid import TILE_PX, RasterGrid, Tile, TileBox, box_of_cells, tiles_of
+from trigpoint_tiles.core.gathering import RangeLimits, Target, gather, no_tally
+from trigpoint_tiles.core.grid import TILE_PX, RasterGrid, TileBox, box_of_cells, tiles_of
 from trigpoint_tiles.core.placement import STRAIGHT, PlacedSweep, SweepTable
 from trigpoint_tiles.core.rendering import Bands, rendered
 from trigpoint_tiles.geotiff import write_cog

@@ -108,6 +108,18 @@ def _blocks(shape: tuple[int, ...], side_px: int) -> Ints:
     return np.asarray(rows[:, None] * (columns[-1] + 1) + columns[None, :], dtype=np.int64)
 
 
+@dataclass(frozen=True, slots=True)
+class _Surface:
+    """The agreement at every shift, in px, of what is so high above the ground."""
+
+    height_m: float
+    spline: RectBivariateSpline
+
+    def place(self, state: Floats) -> Floats:
+        """Where (2,) it is read at a state (4,): shift in px, lean in px per m."""
+        return np.asarray(state[:2] + self.height_m * state[2:])
+
+
 class _Fit:
     """The shift and lean at which the blocks agree most. Rows and columns count pixels down and right."""
 
@@ -116,7 +128,8 @@ class _Fit:
         self._surfaces, self._height_m, self._pixel_m = surfaces, height_m, pixel_m
         self._reach = surfaces.shape[-1] // 2
         self._axis = np.arange(-self._reach, self._reach + 1, dtype=np.float64)
-        self._splines = [self._spline(one) for one in surfaces.sum(axis=0)]
+        self._whole = self._splines(surfaces.sum(axis=0))
+        self._blocks = [self._splines(block) for block in surfaces]
 
     def registration(self) -> Registration:
         """What the surfaces say."""
@@ -138,34 +151,35 @@ class _Fit:
             refused=refused,
         )
 
-    def _spline(self, surface: Floats) -> RectBivariateSpline:
-        return RectBivariateSpline(self._axis, self._axis, surface)
+    def _splines(self, surfaces: Floats) -> list[_Surface]:
+        """The surfaces (k, side, side) that say anything, and their heights."""
+        return [
+            _Surface(float(height_m), RectBivariateSpline(self._axis, self._axis, surface))
+            for height_m, surface in zip(self._height_m, surfaces, strict=True)
+            if surface.any()
+        ]
 
-    def _places(self, state: Floats) -> Floats:
-        """Where (k, 2) each height's surface is read at a state (4,): shift in px, lean in px per m."""
-        return np.asarray(state[:2] + self._height_m[:, None] * state[2:])
-
-    def _gradient(self, splines: Sequence[RectBivariateSpline], state: Floats) -> Floats:
+    def _gradient(self, surfaces: Sequence[_Surface], state: Floats) -> Floats:
         """The agreement's derivatives (4,) by the state."""
-        slopes = np.array(
-            [
-                [float(spline.ev(*place, dx=1)), float(spline.ev(*place, dy=1))]
-                for spline, place in zip(splines, self._places(state), strict=True)
-            ]
-        )
-        return np.concatenate([slopes.sum(axis=0), self._height_m @ slopes])
+        total = np.zeros(4)
+        for one in surfaces:
+            place = one.place(state)
+            slope = np.array([float(one.spline.ev(*place, dx=1)), float(one.spline.ev(*place, dy=1))])
+            total += np.concatenate([slope, one.height_m * slope])
+        return total
 
     def _curvature(self, state: Floats) -> Floats:
         """Minus the second derivatives (4, 4) of the whole agreement."""
         total = np.zeros((4, 4))
-        for spline, place, height_m in zip(self._splines, self._places(state), self._height_m, strict=True):
+        for one in self._whole:
+            height_m, spline, place = one.height_m, one.spline, one.place(state)
             across = float(spline.ev(*place, dx=1, dy=1))
             own = np.array([[float(spline.ev(*place, dx=2)), across], [across, float(spline.ev(*place, dy=2))]])
             total -= np.kron(np.array([[1.0, height_m], [height_m, height_m**2]]), own)
         return total
 
     def _block_gradients(self, state: Floats) -> Floats:
-        return np.array([self._gradient([self._spline(one) for one in block], state) for block in self._surfaces])
+        return np.array([self._gradient(block, state) for block in self._blocks])
 
     def _likelihood_weight(self, state: Floats) -> float:
         """By how much the agreement weighs as a log-likelihood would (Pauli, Racugno and Ventura 2011)."""
@@ -180,13 +194,11 @@ class _Fit:
         prior = self._prior()
 
         def cost(state: Floats) -> float:
-            agreement = sum(
-                float(spline.ev(*place)) for spline, place in zip(self._splines, self._places(state), strict=True)
-            )
+            agreement = sum(float(one.spline.ev(*one.place(state))) for one in self._whole)
             return float(0.5 * prior @ state**2 - weight * agreement)
 
         def slope(state: Floats) -> Floats:
-            return np.asarray(prior * state - weight * self._gradient(self._splines, state))
+            return np.asarray(prior * state - weight * self._gradient(self._whole, state))
 
         lean = LEAN_LIMIT / self._pixel_m
         bounds = [*((at - RIVAL_PX, at + RIVAL_PX) for at in start), (-lean, lean), (-lean, lean)]
@@ -204,18 +216,14 @@ class _Fit:
 
     def _confidence(self, state: Floats) -> float:
         """One less the chance that a rival maximum is as good, by the blocks' differences (paired t, Bonferroni)."""
-        offsets = self._places(np.array([0.0, 0.0, *state[2:]]))
-        leant = np.array(
-            [
-                sum(
-                    self._spline(one)(self._axis + down, self._axis + right)
-                    for one, (down, right) in zip(block, offsets, strict=True)
-                )
-                for block in self._surfaces
-            ]
-        )
+        still = np.array([0.0, 0.0, *state[2:]])
+        leant = np.zeros((len(self._blocks), len(self._axis), len(self._axis)))
+        for block, surfaces in enumerate(self._blocks):
+            for one in surfaces:
+                down, right = one.place(still)
+                leant[block] += one.spline(self._axis + down, self._axis + right)
         total = leant.sum(axis=0)
-        here = np.array([float(self._spline(one).ev(state[0], state[1])) for one in leant])
+        here = np.array([sum(float(one.spline.ev(*one.place(state))) for one in block) for block in self._blocks])
         highest = ndimage.maximum_filter(total, size=3) == total
         away = np.hypot(self._axis[:, None] - state[0], self._axis[None, :] - state[1]) > RIVAL_PX
         rivals = np.argwhere(highest & away)
