@@ -19,6 +19,7 @@ from figures import (
     live,
     mrclam,
     nclt,
+    ortho,
     projection,
     query,
     relocalise,
@@ -48,6 +49,7 @@ GROUPS: Mapping[str, Sequence[Figure]] = {
     "query": query.FIGURES,
     "http": http.FIGURES,
     "viewer": viewer.FIGURES,
+    "ortho": ortho.FIGURES,
     "relocalise": relocalise.FIGURES,
     "security": (*security.FIGURES, *security_fuzz.FIGURES),
 }

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trigpoint.events.envelope import Envelope, EventIdentity
-from trigpoint.events.mapped import MapSolved, TrajectorySolved
+from trigpoint.events.mapped import Mapped, MapSolved, TrajectorySolved
 from trigpoint.events.observed import MapFramePinned
 from trigpoint.events.scanned import PointsScanned
 from trigpoint.geodesy.positions import GridPosition
@@ -105,7 +105,7 @@ def drive_rows(
     ]
 
 
-def map_rows(paths: Iterable[TrajectorySolved], *, map_version: int = 1, first: int = 0) -> list[Envelope[object]]:
+def map_rows(paths: Iterable[TrajectorySolved], *, map_version: int = 1, first: int = 0) -> list[Envelope[Mapped]]:
     """A whole map version of these paths."""
     head = MapSolved(
         map_version=map_version,
@@ -116,7 +116,7 @@ def map_rows(paths: Iterable[TrajectorySolved], *, map_version: int = 1, first: 
         anchor_count=0,
         wall_s=0.0,
     )
-    events = [*paths, head]
+    events: list[Mapped] = [*paths, head]
     return [
         Envelope(EventIdentity("optimisation", f"o{map_version}", first + number), START_NS, event)
         for number, event in enumerate(events)

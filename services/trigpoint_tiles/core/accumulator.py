@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from trigpoint.errors import InputError
 from trigpoint.events.scanned import PointsScanned
-from trigpoint_tiles.core.cells import FIELDS, WHILE_GATHERING, Cells
+from trigpoint_tiles.core.cells import FIELDS, Cells
 from trigpoint_tiles.core.gathering import (
     ASKED_COLUMN,
     ASKED_ROW,
@@ -78,9 +78,10 @@ class Accumulator:
         return _gathered(target.tally)
 
     def finish(self) -> None:
-        """Everything handed on."""
-        while self._slots:
-            self._release(next(iter(self._slots)))
+        """Everything handed on; no sweep can be added any more."""
+        for tile, slot in self._slots.items():
+            self._hand_on(tile, self._pool[slot])
+        self._slots.clear()
 
     def _slot_of(self, tile: Tile) -> int:
         if self._only is not None and tile not in self._only:
@@ -103,7 +104,6 @@ class Accumulator:
 
     def _release(self, tile: Tile) -> None:
         slot = self._slots.pop(tile)
-        self._pool[slot][..., WHILE_GATHERING] = 0
         self._hand_on(tile, self._pool[slot])
         self._pool[slot] = 0
         self._free.append(slot)

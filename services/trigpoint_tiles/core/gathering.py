@@ -47,6 +47,7 @@ INTENSITY_MOST = 1e6
 NOWHERE, LEFT_OUT = -1, -2  # in place of a tile's slot: no cells yet; not wanted
 USED, UNUSABLE, TOO_FAR, WEST, NORTH, EAST, SOUTH, ASKED_COLUMN, ASKED_ROW = range(9)  # of a tally
 TILE_MASK = TILE_PX - 1
+BLOCK = 256  # points placed before any is added to its cell: their cells fit the processor's nearest memory
 FAR = 1 << 40  # cells away: nothing was hit
 
 
@@ -139,9 +140,28 @@ def gather(
 def _gather(
     points: _Points, way: _Way, window: tuple[int, int, Ints], cells: Cells, tally: Ints, run: tuple[int, int]
 ) -> int:
-    number, begin = run
-    matrix = np.empty((2, 4))
-    for at in range(begin, len(points.intensity)):
+    number, at = run
+    index, seen = np.empty(BLOCK, dtype=np.int64), np.empty((BLOCK, 5), dtype=np.int64)
+    while at < len(points.intensity):
+        end, placed = _place_block(points, way, window, tally, at, (index, seen))
+        tally[UNUSABLE] += _fetch(cells, index, placed)  # adds nothing: a count is never negative
+        for one in range(placed):
+            told = _Seen(seen[one, 0], seen[one, 1], seen[one, 2], seen[one, 3] != 0, seen[one, 4] != 0)
+            _add(cells, index[one], told, number)
+        if end < min(at + BLOCK, len(points.intensity)):
+            return end
+        at = end
+    return at
+
+
+@compiled
+def _place_block(
+    points: _Points, way: _Way, window: tuple[int, int, Ints], tally: Ints, begin: int, block: tuple[Ints, Ints]
+) -> tuple[int, int]:
+    """Where the points from `begin` on fall, up to one without cells: the first not placed, and how many were."""
+    index, seen = block
+    matrix, placed = np.empty((2, 4)), 0
+    for at in range(begin, min(begin + BLOCK, len(points.intensity))):
         if at == begin or points.offset_ns[at] != points.offset_ns[at - 1]:
             _take_matrix(way, points.offset_ns[at], matrix)
         place = _placed(points, way, matrix, at)
@@ -155,14 +175,36 @@ def _gather(
         if slot == NOWHERE:
             tally[ASKED_COLUMN] = (place.column >> TILE_BITS) - window[0]
             tally[ASKED_ROW] = (place.row >> TILE_BITS) - window[1]
-            return at
-        tally[USED] += 1
-        tally[WEST], tally[NORTH] = min(tally[WEST], place.column), min(tally[NORTH], place.row)
-        tally[EAST], tally[SOUTH] = max(tally[EAST], place.column), max(tally[SOUTH], place.row)
+            return at, placed
+        _count(tally, place)
         if slot >= 0:
             inside = ((place.row & TILE_MASK) << TILE_BITS) | (place.column & TILE_MASK)
-            _add(cells, ((slot << (2 * TILE_BITS)) | inside) * FIELDS, _seen(points, way, place, at), number)
-    return len(points.intensity)
+            index[placed] = ((slot << (2 * TILE_BITS)) | inside) * FIELDS
+            _keep(seen[placed], _seen(points, way, place, at))
+            placed += 1
+    return min(begin + BLOCK, len(points.intensity)), placed
+
+
+@compiled
+def _fetch(cells: Cells, index: Ints, count: int) -> bool:
+    """Reads cells that are about to be added to, many at once, so that memory's delay is met once for all of them."""
+    impossible = False
+    for one in range(count):
+        impossible |= (cells[index[one]] | cells[index[one] + FIELDS // 2]) < 0
+    return impossible
+
+
+@compiled
+def _count(tally: Ints, place: _Place) -> None:
+    tally[USED] += 1
+    tally[WEST], tally[NORTH] = min(tally[WEST], place.column), min(tally[NORTH], place.row)
+    tally[EAST], tally[SOUTH] = max(tally[EAST], place.column), max(tally[SOUTH], place.row)
+
+
+@compiled
+def _keep(row: Ints, seen: _Seen) -> None:
+    row[0], row[1], row[2] = seen.height_mm, seen.strength, seen.variance_mm2
+    row[3], row[4] = seen.is_ground, seen.is_high
 
 
 @compiled

@@ -4,6 +4,7 @@ import json
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -105,7 +106,7 @@ def test_sigma_comes_from_the_path_and_the_range(layer: tuple[Path, Rendered]) -
 def test_the_archive_and_the_folder_hold_the_same_pictures(layer: tuple[Path, Rendered]) -> None:
     pictures = PictureFolder(layer[0] / "xyz")
     with (layer[0] / "ortho.pmtiles").open("rb") as file:
-        archive = Reader(MmapSource(file))
+        archive: Any = Reader(MmapSource(file))  # type: ignore[no-untyped-call]
         header = archive.header()
         tiles = list(pictures.tiles())
         assert {tile.zoom for tile in tiles} == set(range(header["min_zoom"], header["max_zoom"] + 1))
@@ -126,7 +127,9 @@ def test_a_web_tile_shows_the_ground_where_web_mercator_has_it(layer: tuple[Path
         half_m = 20_037_508.342789244
         x_m = (tile.column * 256 + column + 0.5) * grid.pixel_m - half_m
         y_m = half_m - (tile.row * 256 + row + 0.5) * grid.pixel_m
-        east_m, north_m = transform_coordinates(x_m, y_m, source_crs="EPSG:3857", target_crs=FRAME.crs)
+        east_m, north_m = transform_coordinates(
+            np.asarray(x_m, float), np.asarray(y_m, float), source_crs="EPSG:3857", target_crs=FRAME.crs
+        )
         expected = painted(np.column_stack([east_m - FRAME.origin_easting_m, north_m - FRAME.origin_northing_m]))
         wrong += int(((expected > 50.0) != (shown[row, column, 0] > 128)).sum())
         total += len(row)
