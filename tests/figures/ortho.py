@@ -32,7 +32,7 @@ def of_ign(bench: Workbench, *, value: Callable[[Callable[[str], float]], float]
     if not layer.exists():
         airborne_layer(folder, layer, resolution_m=RESOLUTION_M)
     image = folder / "test_data_rgb.tif"
-    outcome = bench.run("ortho", "register", "--ortho", layer, "--image", image, "--json")
+    outcome = bench.run("ortho", "register", "--ortho", str(layer), "--image", str(image), "--json")
     return Measurement(value=value(outcome.at), command=outcome.command)
 
 
@@ -61,9 +61,9 @@ FIGURES = (
     beside(
         "points to web raster, over NumPy, pyproj and datashader", "x", at_least(5.0), WEB, lambda found: found.ratio
     ),
-    beside("the same, kernel", "million points/s", None, WEB, lambda found: found.kernel / MILLION),
-    beside("the same, datashader", "million points/s", None, WEB, lambda found: found.datashader / MILLION),
+    beside("web raster, kernel", "million points/s", None, WEB, lambda found: found.kernel / MILLION),
+    beside("web raster, datashader", "million points/s", None, WEB, lambda found: found.datashader / MILLION),
     beside("points to the map's own grid, nothing to project", "x", None, OWN, lambda found: found.ratio),
-    beside("the same, kernel", "million points/s", None, OWN, lambda found: found.kernel / MILLION),
-    beside("the same, datashader", "million points/s", None, OWN, lambda found: found.datashader / MILLION),
+    beside("the map's own grid, kernel", "million points/s", None, OWN, lambda found: found.kernel / MILLION),
+    beside("the map's own grid, datashader", "million points/s", None, OWN, lambda found: found.datashader / MILLION),
 )

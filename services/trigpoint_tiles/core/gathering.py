@@ -180,7 +180,7 @@ def _place_block(
         if slot >= 0:
             inside = ((place.row & TILE_MASK) << TILE_BITS) | (place.column & TILE_MASK)
             index[placed] = ((slot << (2 * TILE_BITS)) | inside) * FIELDS
-            _keep(seen[placed], _seen(points, way, place, at))
+            _keep(seen, placed, _seen(points, way, place, at))
             placed += 1
     return min(begin + BLOCK, len(points.intensity)), placed
 
@@ -202,9 +202,9 @@ def _count(tally: Ints, place: _Place) -> None:
 
 
 @compiled
-def _keep(row: Ints, seen: _Seen) -> None:
-    row[0], row[1], row[2] = seen.height_mm, seen.strength, seen.variance_mm2
-    row[3], row[4] = seen.is_ground, seen.is_high
+def _keep(rows: Ints, at: int, seen: _Seen) -> None:
+    rows[at, 0], rows[at, 1], rows[at, 2] = seen.height_mm, seen.strength, seen.variance_mm2
+    rows[at, 3], rows[at, 4] = seen.is_ground, seen.is_high
 
 
 @compiled

@@ -150,15 +150,14 @@ class SweepPlacer:
         base_m = np.where(far[:, None], 0.0, near) @ T_base_sensor[:, :3].T + T_base_sensor[:, 3]
         point_m = transform_points(pose, base_m[:, :2])
         straight_px: Floats = point_m @ affine.matrix.T + affine.offset
-        bend_px: Floats = exact_pixels(point_m, self._frame, self._grid) - straight_px
-        return bend_px
+        return np.asarray(exact_pixels(point_m, self._frame, self._grid) - straight_px, dtype=np.float64)
 
 
 def _to_plane(pose: Floats, T_base_sensor: Floats, plane: PixelAffine) -> Floats:
     """From sensor to plane (m, 2, 4) at poses (m, 3), with the sensor in the base (3, 4)."""
     c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
     turn = np.stack([np.stack([c, -s], axis=-1), np.stack([s, c], axis=-1)], axis=-2)
-    linear = np.einsum("ij,mjk,kl->mil", plane.matrix, turn, T_base_sensor[:2])
+    linear: Floats = np.einsum("ij,mjk,kl->mil", plane.matrix, turn, T_base_sensor[:2])
     linear[:, :, 3] += pose[:, :2] @ plane.matrix.T + plane.offset
     return linear
 
