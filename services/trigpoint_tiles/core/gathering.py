@@ -144,7 +144,7 @@ def _gather(
     index, seen = np.empty(BLOCK, dtype=np.int64), np.empty((BLOCK, 5), dtype=np.int64)
     while at < len(points.intensity):
         end, placed = _place_block(points, way, window, tally, at, (index, seen))
-        tally[UNUSABLE] += _fetch(cells, index, placed)  # adds nothing: a count is never negative
+        tally[UNUSABLE] += _fetch(cells, index, seen, placed)  # adds nothing: a count is never negative
         for one in range(placed):
             told = _Seen(seen[one, 0], seen[one, 1], seen[one, 2], seen[one, 3] != 0, seen[one, 4] != 0)
             _add(cells, index[one], told, number)
@@ -186,11 +186,11 @@ def _place_block(
 
 
 @compiled
-def _fetch(cells: Cells, index: Ints, count: int) -> bool:
+def _fetch(cells: Cells, index: Ints, seen: Ints, count: int) -> bool:
     """Reads cells that are about to be added to, many at once, so that memory's delay is met once for all of them."""
     impossible = False
     for one in range(count):
-        impossible |= (cells[index[one]] | cells[index[one] + FIELDS // 2]) < 0
+        impossible |= (cells[index[one]] | cells[index[one] + (1 - seen[one, 3]) * (FIELDS // 2)]) < 0
     return impossible
 
 
