@@ -35,6 +35,7 @@ COMMANDS = {
     "evaluate": ("trigpoint_cli.evaluate", "Measure a map against withheld fixes, withheld anchors or truth."),
     "landmarks": ("trigpoint_cli.landmarks", "Ask for landmarks."),
     "export": ("trigpoint_cli.export", "Write the map as files of other GIS programs, or a QGIS project."),
+    "ortho": ("trigpoint_cli.ortho", "Lay lidar points on the ground as rasters, and measure aerial images by them."),
     "tokens": ("trigpoint_cli.tokens", "Issue, list and revoke the HTTP service's tokens."),
     "explain": ("trigpoint_cli.explain", "Say what a landmark's place comes from."),
     "log": ("trigpoint_cli.log", "Say what a log holds, or whether it is whole."),

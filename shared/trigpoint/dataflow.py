@@ -45,6 +45,7 @@ PERCEPTION = "trigpoint_perception"
 OPTIMISATION = "trigpoint_optimisation"
 LANDMARKS = "trigpoint_landmarks"
 EVALUATION = "trigpoint_evaluation"
+TILES = "trigpoint_tiles"
 CLI = "trigpoint_cli"  # composes the others; reads and writes no event itself
 
 DIAGRAM_BEGIN = "<!-- data flow: begin, written by `make readme` -->"
@@ -86,9 +87,9 @@ FLOWS: tuple[Flow, ...] = (
     Flow(ImuMeasured, INGEST, (FILTERING, PERCEPTION, OPTIMISATION, EVALUATION), sender=VEHICLE),
     Flow(GnssFixReceived, INGEST, (FILTERING, OPTIMISATION, EVALUATION), sender=VEHICLE),
     Flow(LandmarksDetected, INGEST, (OPTIMISATION, LANDMARKS, EVALUATION), sender=VEHICLE),
-    Flow(PointsScanned, INGEST, (PERCEPTION,), sender=VEHICLE),
+    Flow(PointsScanned, INGEST, (PERCEPTION, TILES), sender=VEHICLE),
     Flow(EventRefused, INGEST, (EVALUATION,)),
-    Flow(MapFramePinned, INGEST, (FILTERING, OPTIMISATION, LANDMARKS, EVALUATION)),
+    Flow(MapFramePinned, INGEST, (FILTERING, OPTIMISATION, LANDMARKS, EVALUATION, TILES)),
     Flow(AnchorLabelled, INGEST, (OPTIMISATION, LANDMARKS, EVALUATION)),
     Flow(AnchorRetracted, INGEST, (OPTIMISATION, LANDMARKS, EVALUATION)),
     Flow(DriveExcluded, INGEST, (PERCEPTION, OPTIMISATION, EVALUATION)),
@@ -98,12 +99,12 @@ FLOWS: tuple[Flow, ...] = (
     Flow(GateAlarmed, FILTERING, (EVALUATION,)),
     Flow(LandmarksPerceived, PERCEPTION, (OPTIMISATION, EVALUATION)),
     Flow(OdometryMatched, PERCEPTION, ()),
-    Flow(TrajectorySolved, OPTIMISATION, (LANDMARKS, EVALUATION)),
+    Flow(TrajectorySolved, OPTIMISATION, (LANDMARKS, EVALUATION, TILES)),
     Flow(LandmarkSolved, OPTIMISATION, (LANDMARKS, EVALUATION)),
     Flow(AnchorAssociated, OPTIMISATION, (LANDMARKS, EVALUATION)),
     Flow(ImageOffsetSolved, OPTIMISATION, (LANDMARKS, EVALUATION)),
     Flow(LabelGainSolved, OPTIMISATION, (LANDMARKS,)),
-    Flow(MapSolved, OPTIMISATION, (LANDMARKS, EVALUATION)),
+    Flow(MapSolved, OPTIMISATION, (LANDMARKS, EVALUATION, TILES)),
     Flow(OdometryCorrected, OPTIMISATION, (VEHICLE,)),
 )
 

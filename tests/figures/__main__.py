@@ -21,6 +21,7 @@ from figures import (
     live,
     mrclam,
     nclt,
+    ortho,
     projection,
     query,
     relocalise,
@@ -51,6 +52,7 @@ GROUPS: Mapping[str, Sequence[Figure]] = {
     "query": query.FIGURES,
     "http": http.FIGURES,
     "viewer": viewer.FIGURES,
+    "ortho": ortho.FIGURES,
     "relocalise": relocalise.FIGURES,
     "security": (*security.FIGURES, *security_fuzz.FIGURES),
 }

@@ -1,0 +1,1 @@
+"""Airborne lidar of the French IGN, classified, as the tiles service would gather it."""

@@ -1,0 +1,1 @@
+"""Drives with a lidar over ground that is known, and the logs they leave."""
