@@ -39,7 +39,7 @@ def ingest_logs(
     chosen = settings if settings is not None else IngestSettings()
     journal = Journal(log, bus, chosen)
     for path in paths:
-        _ingest_file(path, journal, batch_count=chosen.batch_count, progress=progress or _nobody)
+        _ingest_file(path, journal, chosen, progress=progress or _nobody)
     return journal.tally.report()
 
 
@@ -47,7 +47,7 @@ def _nobody(count: int) -> None:
     """Hears of progress, and does nothing."""
 
 
-def _ingest_file(path: Path, journal: Journal, *, batch_count: int, progress: Progress) -> None:
+def _ingest_file(path: Path, journal: Journal, settings: IngestSettings, *, progress: Progress) -> None:
     damages: list[Damage] = []
     count = 0
     try:
@@ -57,7 +57,7 @@ def _ingest_file(path: Path, journal: Journal, *, batch_count: int, progress: Pr
             else:
                 detail = f"{message.identity.source!r} does not describe itself in {path.name}"
                 journal.refuse(message, EventRejected(UNKNOWN_VEHICLE, detail))
-            if journal.pending_count >= batch_count:
+            if journal.pending_count >= settings.batch_count or journal.pending_bytes >= settings.pending_bytes:
                 journal.flush()
             count += 1
             if count % PROGRESS_COUNT == 0:

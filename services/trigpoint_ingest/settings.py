@@ -20,10 +20,10 @@ class IngestSettings:
     to `gap_timeout_s` for an earlier one, with at most `held_limit` others of its drive. Of a refused payload
     `refused_payload_limit` bytes are kept.
 
-    A payload has at most `message_limit_bytes`. A vehicle may send `vehicle_rate_hz` messages a second, and
-    `vehicle_burst` at once. At most `drive_limit` drives are known, and
-    `name_limit` vehicles heard. A full disk is tried again every `disk_retry_s`;
-    an append that takes longer than `slow_append_s` is told of.
+    A payload has at most `message_limit_bytes`: the largest sweep of a lidar fits in. A vehicle may send
+    `vehicle_rate_hz` messages a second, and `vehicle_burst` at once. At most `drive_limit` drives are known, and
+    `name_limit` vehicles heard. A full disk is tried again every `disk_retry_s`; an append that takes longer than
+    `slow_append_s` is told of.
     """
 
     root: str = DEFAULT_ROOT
@@ -40,7 +40,7 @@ class IngestSettings:
     gap_timeout_s: Seconds = 30.0
     held_limit: int = 16_384
     refused_payload_limit: int = 65_536
-    message_limit_bytes: Count = 4 * 1024 * 1024
+    message_limit_bytes: Count = 8 * 1024 * 1024
     vehicle_rate_hz: Positive = 50_000.0
     vehicle_burst: Count = 100_000
     drive_limit: Count = 100_000

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 
@@ -18,6 +18,8 @@ from trigpoint.events.truth import truth_lines
 from trigpoint.events.truth_objects import object_lines
 from trigpoint.logs.vehicle_log import write_vehicle_log
 from trigpoint_vehicle.aerial_files import PictureFolder, write_pictures
+from trigpoint_vehicle.cloud_conversion import LeftAside, WrittenClouds, write_cloud_drive
+from trigpoint_vehicle.cloud_files import VehicleScans, listed_files
 from trigpoint_vehicle.core.aerial import aerial_pictures
 from trigpoint_vehicle.core.anchors_geojson import anchors_geojson
 from trigpoint_vehicle.core.campus import Campus, conversion_of, simulate_campus
@@ -27,10 +29,12 @@ from trigpoint_vehicle.core.mrclam import BARCODES, LANDMARKS, RobotSources, mrc
 from trigpoint_vehicle.core.recording import Conversion
 from trigpoint_vehicle.core.scene.world import Scene
 from trigpoint_vehicle.core.table_manifest import parsed_manifest
-from trigpoint_vehicle.core.table_rows import converted_tables
-from trigpoint_vehicle.core.text_tables import SourceText
+from trigpoint_vehicle.core.table_rows import converted_tables, named_scans
 from trigpoint_vehicle.core.victoria_park import GPS, INPUTS, MEASUREMENTS, victoria_park
+from trigpoint_vehicle.kitti_files import kitti_drive
+from trigpoint_vehicle.ros_bags import BagChoice, bag_drive, opened_bag
 from trigpoint_vehicle.settings import SimulationSettings
+from trigpoint_vehicle.source_files import read_source
 
 TRUTH_NAME, OBJECTS_NAME, ANCHORS_NAME = "truth.csv", "objects.csv", "anchors.geojson"
 CAST_AHEAD = 3  # groups of sweeps for each core, while the ones before are written
@@ -46,20 +50,13 @@ class Written:
     truth: Path | None
     anchors: Path | None
     objects: Path | None = None
+    left_aside: LeftAside = field(default_factory=LeftAside)
     pictures: tuple[PictureFolder, ...] = ()
 
 
-def read_source(folder: Path, name: str) -> SourceText:
-    """A file's text. Raises InputError if it is not there or not UTF-8."""
-    path = folder / name
-    try:
-        return SourceText(str(path), path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from error
-
-
-def write_conversion(conversion: Conversion, out_dir: Path) -> Written:
-    """One `<vehicle>.mcap` a vehicle, `truth.csv`, `objects.csv` and `anchors.geojson` where there are any.
+def write_conversion(conversion: Conversion, out_dir: Path, scans: VehicleScans | None = None) -> Written:
+    """One `<vehicle>.mcap` a vehicle, with its `scans` read one by one, `truth.csv`, `objects.csv` and
+    `anchors.geojson` where there are any.
 
     Raises InputError for a folder that cannot be written, AppendFailed for a log.
     """
@@ -69,14 +66,14 @@ def write_conversion(conversion: Conversion, out_dir: Path) -> Written:
     has_truth = bool(known.paths or known.landmarks or known.labels or known.fixes)
     try:
         out_dir.mkdir(parents=True, exist_ok=True)
-        logs = tuple(_written_logs(conversion, out_dir))
+        logs = tuple(_written_logs(conversion, out_dir, scans or VehicleScans()))
+        anchors = anchors_geojson(conversion.anchors) if conversion.anchors else None
         return Written(
             logs=logs,
             truth=_written(out_dir / TRUTH_NAME, truth_lines(known)) if has_truth else None,
-            anchors=_written(out_dir / ANCHORS_NAME, anchors_geojson(conversion.anchors))
-            if conversion.anchors
-            else None,
+            anchors=None if anchors is None else _written(out_dir / ANCHORS_NAME, anchors),
             objects=_written(out_dir / OBJECTS_NAME, object_lines(conversion.objects)) if conversion.objects else None,
+            left_aside=LeftAside() if scans is None else scans.left_aside,
         )
     except OSError as error:
         raise InputError(f"{out_dir}: cannot be written: {error}") from error
@@ -87,11 +84,11 @@ def _written(path: Path, parts: Iterable[str]) -> Path:
     return path
 
 
-def _written_logs(conversion: Conversion, out_dir: Path) -> list[Path]:
+def _written_logs(conversion: Conversion, out_dir: Path, scans: VehicleScans) -> list[Path]:
     logs = []
     for recording in tqdm(conversion.recordings, desc="writing logs", unit="vehicle", disable=None):
         path = out_dir / f"{recording.vehicle}.mcap"
-        write_vehicle_log(path, recording.rows, vehicle=recording.vehicle)
+        write_vehicle_log(path, scans.rows_of(recording), vehicle=recording.vehicle)
         logs.append(path)
     return logs
 
@@ -119,6 +116,17 @@ def _robot_sources(source: Path, robot: int) -> RobotSources:
     return RobotSources(robot=robot, odometry=odometry, measurement=measurement, truth=truth)
 
 
+def convert_kitti(source: Path, out_dir: Path) -> WrittenClouds:
+    """The KITTI raw drive of a folder as a log. Raises InputError."""
+    return write_cloud_drive(kitti_drive(source), out_dir)
+
+
+def convert_bag(source: Path, out_dir: Path, choice: BagChoice) -> WrittenClouds:
+    """A ROS bag, of ROS 1 or 2, as a log. Raises InputError."""
+    with opened_bag(source) as reader:
+        return write_cloud_drive(bag_drive(reader, source, choice), out_dir)
+
+
 def convert_table(manifest_path: Path, out_dir: Path, *, data_dir: Path | None = None) -> Written:
     """The tables a manifest describes as logs, truth and anchors; `data_dir` replaces the manifest's.
 
@@ -128,8 +136,9 @@ def convert_table(manifest_path: Path, out_dir: Path, *, data_dir: Path | None =
     manifest = parsed_manifest(text.name, text.text)
     folder = data_dir or manifest_path.parent / manifest.data_dir
     names = tqdm(manifest.files(), desc="reading", unit="file", disable=None)
-    sources = [read_source(folder, name) for name in names]
-    return write_conversion(converted_tables(manifest, text.text, sources), out_dir)
+    sources = [listed_files(folder, name) if "*" in name else read_source(folder, name) for name in names]
+    conversion = converted_tables(manifest, text.text, sources)
+    return write_conversion(conversion, out_dir, VehicleScans(folder, named_scans(manifest, sources)))
 
 
 def record_campus(settings: SimulationSettings, out_dir: Path, *, aerial: Path | None = None) -> Written:

@@ -64,7 +64,7 @@ class VehicleSettings:
     segment_bytes: int = 4 * MIB
     when_full: Literal["refuse", "drop oldest"] = "refuse"
     sync_interval_s: float = 0.005
-    message_limit_bytes: int = 4 * MIB
+    message_limit_bytes: int = 8 * MIB
     window_count: int = 8192
     window_bytes: int = 16 * MIB
     together_count: int = 256

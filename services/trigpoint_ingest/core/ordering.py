@@ -14,6 +14,7 @@ from trigpoint_ingest.core.validation import Drive, drive_of
 
 DESCRIPTION_SCHEMA = schema_name(VehicleDescribed)
 HELD_LIMIT = 10_000  # messages of a file that may stand before their drive's description
+HELD_BYTES = 64 * 1024 * 1024  # of their payloads
 
 MessageT = TypeVar("MessageT", bound=EncodedMessage)
 
@@ -21,11 +22,11 @@ MessageT = TypeVar("MessageT", bound=EncodedMessage)
 def described_first(messages: Iterable[MessageT]) -> Iterator[tuple[MessageT, bool]]:
     """The messages in their order, but each drive's behind its description; with each whether its drive has one.
 
-    At most HELD_LIMIT messages wait for a description; what comes on top of them counts as without one.
+    At most HELD_LIMIT messages and HELD_BYTES wait for a description; what comes on top of them counts as without one.
     """
     described: set[Drive] = set()
     held: dict[Drive, list[MessageT]] = {}
-    held_count = 0
+    held_count = held_bytes = 0
     for message in messages:
         drive = drive_of(message.identity)
         if drive in described:
@@ -34,11 +35,13 @@ def described_first(messages: Iterable[MessageT]) -> Iterator[tuple[MessageT, bo
             described.add(drive)
             waiting = held.pop(drive, [])
             held_count -= len(waiting)
+            held_bytes -= sum(len(one.payload) for one in waiting)
             for ordered in (message, *waiting):
                 yield ordered, True
-        elif held_count < HELD_LIMIT:
+        elif held_count < HELD_LIMIT and held_bytes + len(message.payload) <= HELD_BYTES:
             held.setdefault(drive, []).append(message)
             held_count += 1
+            held_bytes += len(message.payload)
         else:
             yield message, False
     for waiting in held.values():

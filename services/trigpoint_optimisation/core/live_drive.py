@@ -132,7 +132,7 @@ class LiveDrive:
                 self._heard.append((stamp_ns, sequence, event))
         elif isinstance(event, VehicleDescribed):
             self.described = event
-        else:
+        elif isinstance(event, WheelSpeedMeasured | WheelPairMeasured):
             self._rolled(self._wheel(event, stamp_ns))
         return legs
 

@@ -1,8 +1,10 @@
 """One drive's events put in order of time and numbered, as a vehicle would have sent them."""
 
 import hashlib
-from collections.abc import Iterable, Sequence
+import heapq
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 from trigpoint.events.corrected import AnchorLabelled
 from trigpoint.events.envelope import Envelope, EventIdentity
@@ -54,3 +56,43 @@ def recording_of(described: VehicleDescribed, timed: Iterable[Timed], *, boot_id
         for sequence, (stamp_ns, event) in enumerate(described_first + ordered)
     )
     return Recording(vehicle=vehicle, rows=rows)
+
+
+def merged_rows(
+    described: VehicleDescribed, streams: Iterable[Iterable[Timed]], *, boot_id: str
+) -> Iterator[Envelope[Observed]]:
+    """As a recording's rows, from streams that are each in order of stamp, one event of each in memory at a time.
+
+    A stream that goes back in time keeps its own order.
+    """
+    merged = heapq.merge(*streams, key=lambda pair: pair[0])
+    first = next(merged, None)
+    opening: list[Timed] = [(0, described)] if first is None else [(first[0], described), first]
+    for sequence, (stamp_ns, event) in enumerate(chain(opening, merged)):
+        yield Envelope(EventIdentity(described.vehicle, boot_id, sequence), stamp_ns, event)
+
+
+def rows_with(recording: Recording, streams: Iterable[Iterable[Timed]]) -> Iterator[Envelope[Observed]]:
+    """A recording's rows numbered anew with those of streams among them, each in order of stamp."""
+    described, *others = recording.rows
+    timed: list[Timed] = [(row.stamp_ns, row.event) for row in others]
+    event = described.event
+    if not isinstance(event, VehicleDescribed):
+        raise TypeError(f"a recording opens with {type(event).__name__}, not with VehicleDescribed")
+    return merged_rows(event, (timed, *streams), boot_id=described.identity.boot_id)
+
+
+def nearly_ordered(timed: Iterable[Timed], *, span_ns: int) -> Iterator[Timed]:
+    """Events that came late by up to `span_ns` put in order of stamp; what came later still keeps its place."""
+    waiting: list[tuple[int, int, Observed]] = []
+    newest_ns = 0
+    for number, (stamp_ns, event) in enumerate(timed):
+        newest_ns = max(newest_ns, stamp_ns)
+        heapq.heappush(waiting, (stamp_ns, number, event))
+        while newest_ns - waiting[0][0] > span_ns:
+            stamp_ns, _, event = heapq.heappop(waiting)
+            yield stamp_ns, event
+            if not waiting:
+                break
+    for stamp_ns, _, event in sorted(waiting, key=lambda row: row[:2]):
+        yield stamp_ns, event

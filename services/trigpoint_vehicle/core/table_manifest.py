@@ -30,6 +30,7 @@ from trigpoint_vehicle.core.source_frames import (
 from trigpoint_vehicle.core.source_times import GPS_EPOCH, UNIX_EPOCH, TimeScale, TimeUnit
 
 EPOCH_YEARS = (1900, 2100)  # the first and the last: what is counted from them fits 64-bit nanoseconds
+SENSOR_LENGTH = 200  # characters
 VEHICLE_NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"  # a file's name and part of a key on the bus
 
 
@@ -150,6 +151,7 @@ def _listed(given: object) -> object:
 
 
 AsTime = Annotated[TimeColumn, BeforeValidator(_time)]
+Triple = tuple[float, float, float]
 
 
 class Fixes(PositionPart):
@@ -207,6 +209,26 @@ class Detections(FilePart):
         if (None in polar) == (None in plane) or (None in polar and any(polar)) or (None in plane and any(plane)):
             raise ValueError("give either range and bearing or x and y")
         return self
+
+
+class Sweeps(FilePart):
+    """A lidar's scans, a file each: `file` has a row a scan, its path in column `scan`; or `file` is a pattern such as
+    `scans/*.pcd`, whose files are the rows and their names without suffix the column `stem`.
+
+    The lidar stands at `position_m` in the base frame (z up from the ground), turned by roll about x, then pitch about
+    y, then yaw about z. `origin_m` is taken off the coordinates of LAS files. `point_times` "gps_time": these say of
+    each point when it was measured, and `time` is the first point's.
+    """
+
+    time: AsTime
+    scan: str = "scan"
+    sensor: str = Field(default="lidar", max_length=SENSOR_LENGTH)
+    position_m: Triple
+    roll_deg: float = 0.0
+    pitch_deg: float = 0.0
+    yaw_deg: float = 0.0
+    origin_m: Triple = (0.0, 0.0, 0.0)
+    point_times: Literal["none", "gps_time"] = "none"
 
 
 class Heading(ManifestPart):
@@ -270,17 +292,22 @@ class Vehicle(ManifestPart):
     wheel_pairs: Annotated[tuple[WheelPairs, ...], BeforeValidator(_listed)] = ()
     inertial: Annotated[tuple[Inertial, ...], BeforeValidator(_listed)] = ()
     detections: Annotated[tuple[Detections, ...], BeforeValidator(_listed)] = ()
+    sweeps: Annotated[tuple[Sweeps, ...], BeforeValidator(_listed)] = ()
     true_path: Annotated[tuple[TruePath, ...], BeforeValidator(_listed)] = ()
 
     def parts(self) -> tuple[FilePart, ...]:
         """All parts that read rows."""
         parts: tuple[FilePart, ...] = (*self.fixes, *self.wheel_speeds, *self.wheel_pairs, *self.inertial)
-        return (*parts, *self.detections, *self.true_path)
+        return (*parts, *self.detections, *self.sweeps, *self.true_path)
 
     @model_validator(mode="after")
     def _has_files(self) -> Self:
         if not self.file and any(not part.file for part in self.parts()):
             raise ValueError(f"vehicle {self.name!r} has no file, and a part of it names none either")
+        if self.sweeps and not (self.fixes or self.wheel_speeds or self.wheel_pairs):
+            raise ValueError(
+                f"vehicle {self.name!r} has sweeps without a path: neither fixes nor wheel_speeds nor pairs"
+            )
         if self.wheel_pairs and self.geometry.track_m <= 0.0:
             raise ValueError(f"vehicle {self.name!r} has wheel_pairs, so its geometry needs track_m above 0")
         return self

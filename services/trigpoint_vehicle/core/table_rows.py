@@ -18,6 +18,7 @@ from trigpoint.events.observed import (
 )
 from trigpoint.events.truth import Truth, TruthLandmark, TruthPath
 from trigpoint_vehicle.core.recording import Conversion, Recording, Timed, boot_id_of, recording_of
+from trigpoint_vehicle.core.scan_rows import ScanSource, scan_source
 from trigpoint_vehicle.core.source_frames import grid_headings_rad, wgs84_from_source
 from trigpoint_vehicle.core.sweep_events import sweeps_of
 from trigpoint_vehicle.core.table_manifest import (
@@ -223,3 +224,13 @@ def converted_tables(manifest: Manifest, manifest_text: str, texts: Sequence[Sou
         ),
         anchors=tuple(anchor for part in manifest.anchors for anchor in _anchors(reading, part)),
     )
+
+
+def named_scans(manifest: Manifest, texts: Sequence[SourceText]) -> dict[str, tuple[ScanSource, ...]]:
+    """The scans of each vehicle that has some; `texts` as for `converted_tables`. Raises InputError as that does."""
+    reading = Reading(manifest, manifest.files(), tuple(texts))
+    return {
+        vehicle.name: tuple(scan_source(reading, vehicle, part) for part in vehicle.sweeps)
+        for vehicle in manifest.vehicle
+        if vehicle.sweeps
+    }

@@ -8,7 +8,7 @@ from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from numpy.typing import NDArray
 
 from trigpoint.errors import EventRejected
-from trigpoint.events.packed_points import UNDECODABLE, PackedField, unpacked_points
+from trigpoint.events.packed_points import NS_PER_S, UNDECODABLE, PackedField, unpacked_points
 from trigpoint.events.scanned import PointsScanned
 
 Floats = NDArray[np.float64]
@@ -64,10 +64,8 @@ def cloud_event(message: PointCloud) -> PointsScanned:
 
     Raises EventRejected, "undecodable", as `unpacked_points` does.
     """
-    stamp_ns = message.timestamp.ToNanoseconds() if message.HasField("timestamp") else None
+    stamp_ns = message.timestamp.seconds * NS_PER_S + message.timestamp.nanos if message.HasField("timestamp") else None
     fields = [_packed_field(field) for field in message.fields]
-    if message.point_stride == 0:
-        raise EventRejected(UNDECODABLE, "points of 0 bytes")
     points = unpacked_points(fields, message.data, stride=message.point_stride, stamp_ns=stamp_ns)
     position, orientation = message.pose.position, message.pose.orientation
     turned = (orientation.x, orientation.y, orientation.z, orientation.w)

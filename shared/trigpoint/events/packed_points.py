@@ -19,9 +19,11 @@ UNIT_NS_OF: Mapping[str, float] = {"offset_ns": 1.0, "t": 1.0, "offset_time": 1.
 ABSOLUTE_TIME = "timestamp"  # since the Unix epoch: in s, as Hesai and RoboSense write it, or in ns, as Livox does
 SECONDS_LIMIT = 1e12  # no time in s is as late, every time in ns since 1970-01-01T00:16:40Z is later
 NS_PER_S = 1_000_000_000
+STAMP_LIMIT_NS = 2**62  # the year 2116: differences stay within 64 bits
 RING_LIMIT = np.iinfo(np.uint16).max
 OFFSET_LOWEST_NS, OFFSET_HIGHEST_NS = float(np.iinfo(np.int32).min), float(np.iinfo(np.int32).max)
-NUMBERS_LIMIT = 64  # fields of a point
+FIELDS_LIMIT, STRIDE_LIMIT = 64, 1024  # of a point, bytes: drivers use up to 10 fields and 48 bytes
+KNOWN = frozenset((*AXES, *INTENSITIES, *RINGS, *UNIT_NS_OF, ABSOLUTE_TIME))
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,21 +55,24 @@ def unpacked_points(
     """
     rows = _rows(fields, data, stride)
     point_m = np.empty((len(rows), 3), dtype=np.float32)
-    for index, axis in enumerate(AXES):
-        with np.errstate(over="ignore"):  # what is too far for float32 is infinite, which nobody takes for a return
+    with np.errstate(over="ignore", invalid="ignore"):  # what is too far for float32 is infinite: no return
+        for index, axis in enumerate(AXES):
             point_m[:, index] = rows[axis]
-    return PackedPoints(
-        point_m=point_m,
-        intensity=_intensity(rows),
-        offset_ns=_offset_ns(rows, stamp_ns),
-        ring=_ring(rows),
-    )
+        return PackedPoints(
+            point_m=point_m,
+            intensity=_intensity(rows),
+            offset_ns=_offset_ns(rows, stamp_ns),
+            ring=_ring(rows),
+        )
 
 
 def _rows(fields: Sequence[PackedField], data: bytes, stride: int) -> NDArray[np.void]:
     """The data as a structured array (n,)."""
-    if len(fields) > NUMBERS_LIMIT:
-        raise EventRejected(UNDECODABLE, f"a point of {len(fields)} fields, limit {NUMBERS_LIMIT}")
+    if len(fields) > FIELDS_LIMIT or not 1 <= stride <= STRIDE_LIMIT:
+        raise EventRejected(
+            UNDECODABLE,
+            f"points of {len(fields)} fields and {stride} bytes: up to {FIELDS_LIMIT}, and 1 to {STRIDE_LIMIT}",
+        )
     by_name = {field.name: field for field in fields}
     if len(by_name) < len(fields):
         listed = ", ".join(field.name for field in fields)
@@ -77,14 +82,15 @@ def _rows(fields: Sequence[PackedField], data: bytes, stride: int) -> NDArray[np
             kind = by_name[axis].dtype if axis in by_name else "missing"
             raise EventRejected(UNDECODABLE, f"field {axis!r} is {kind}: float32 or float64 is needed")
     for field in fields:
-        if field.offset + field.dtype.itemsize > stride:
+        if not 0 <= field.offset <= stride - field.dtype.itemsize:
             raise EventRejected(
                 UNDECODABLE,
                 f"field {field.name!r} ends at byte {field.offset + field.dtype.itemsize} of a point of {stride} bytes",
             )
     if len(data) % stride:
         raise EventRejected(UNDECODABLE, f"{len(data)} bytes are no whole number of points of {stride} bytes")
-    names, formats, offsets = list(by_name), [one.dtype for one in fields], [one.offset for one in fields]
+    used = [field for field in fields if field.name in KNOWN]
+    names, formats, offsets = [one.name for one in used], [one.dtype for one in used], [one.offset for one in used]
     layout = np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": stride})
     return np.frombuffer(data, dtype=layout)
 
@@ -95,7 +101,9 @@ def _first_of(rows: NDArray[np.void], names: Sequence[str]) -> str | None:
 
 def _intensity(rows: NDArray[np.void]) -> NDArray[np.float32]:
     name = _first_of(rows, INTENSITIES)
-    return np.zeros(len(rows), dtype=np.float32) if name is None else np.ascontiguousarray(rows[name], dtype=np.float32)
+    if name is None:
+        return np.zeros(len(rows), dtype=np.float32)
+    return np.ascontiguousarray(rows[name], dtype=np.float32)
 
 
 def _ring(rows: NDArray[np.void]) -> NDArray[np.uint16]:
@@ -133,8 +141,8 @@ def _offset_ns(rows: NDArray[np.void], stamp_ns: int | None) -> NDArray[np.int32
 
 
 def _after_stamp_ns(column: NDArray[np.generic], stamp_ns: int | None) -> Floats:
-    if stamp_ns is None:
-        raise EventRejected(UNDECODABLE, f"{ABSOLUTE_TIME}: times since the epoch, and the cloud has no stamp")
+    if stamp_ns is None or not 0 <= stamp_ns < STAMP_LIMIT_NS:
+        raise EventRejected(UNDECODABLE, f"{ABSOLUTE_TIME}: times since the epoch, and the cloud has stamp {stamp_ns}")
     given = column.astype(np.float64)
     if column.dtype.kind in "iu":
         after = (column.astype(np.int64) - stamp_ns).astype(np.float64)

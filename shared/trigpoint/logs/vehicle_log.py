@@ -4,18 +4,19 @@ import contextlib
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 
 from trigpoint.errors import AppendFailed, LogDamaged
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.observed import Observed
+from trigpoint.events.scanned import PointsScanned
 from trigpoint.logs.channels import packed_rows
 from trigpoint.logs.chunks import messages
 from trigpoint.logs.mcap_scan import Damage, McapScan
 from trigpoint.logs.mcap_writer import McapFileWriter
 
 BATCH_ROWS = 4096
+BATCH_SWEEPS = 8  # of points among them: some 20 MB
 DAMAGES_NAMED = 3  # in an error's message; the rest is counted
 
 
@@ -58,8 +59,15 @@ def _append(writer: McapFileWriter, batch: Sequence[Envelope[Observed]]) -> int:
 
 
 def _batches(rows: Iterable[Envelope[Observed]]) -> Iterator[list[Envelope[Observed]]]:
-    remaining = iter(rows)
-    while batch := list(islice(remaining, BATCH_ROWS)):
+    batch: list[Envelope[Observed]] = []
+    sweeps = 0
+    for row in rows:
+        batch.append(row)
+        sweeps += isinstance(row.event, PointsScanned)
+        if len(batch) == BATCH_ROWS or sweeps == BATCH_SWEEPS:
+            yield batch
+            batch, sweeps = [], 0
+    if batch:
         yield batch
 
 

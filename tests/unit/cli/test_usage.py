@@ -32,6 +32,8 @@ NOTHING = "no-such-directory"
         ("convert", "victoria-park", NOTHING, NOTHING),
         ("convert", "mrclam", NOTHING, NOTHING),
         ("convert", "table", "missing.toml", NOTHING),
+        ("convert", "kitti", NOTHING, NOTHING),
+        ("convert", "rosbag", "missing.bag", NOTHING),
     ],
     ids=" ".join,
 )
@@ -74,6 +76,7 @@ def test_an_empty_directory_is_no_data_directory(tmp_path: Path) -> None:
         ("build", "--data", ".", "--method", "magic"),
         ("evaluate", "gnss", "--data", "."),
         ("demo", "--seed", "many"),
+        ("convert", "rosbag", "a.bag", "out", "--lidar", "velodyne=1,2"),
     ],
     ids=" ".join,
 )

@@ -1,3 +1,4 @@
+import contextlib
 import math
 from dataclasses import replace
 
@@ -5,6 +6,8 @@ import numpy as np
 import pytest
 from foxglove_schemas_protobuf.PackedElementField_pb2 import PackedElementField
 from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from event_examples.any_event import same_event
 from event_examples.one_each import EVENTS
@@ -20,18 +23,17 @@ XYZ = (("x", F32, 1.0), ("y", F32, 2.0), ("z", F32, 3.0))
 STAMP_NS = 1_700_000_000_000_000_000
 
 
-def cloud(*columns: tuple[str, int, float], count: int = 2, padding: int = 0) -> PointCloud:
+def cloud(*columns: tuple[str, int, float], count: int = 2, padding: int = 0, stride: int = 0) -> PointCloud:
     """A foreign cloud: each point has the same values, the fields stand one behind the other."""
     layout = np.dtype([(f"{index}", NUMPY[kind]) for index, (_, kind, _) in enumerate(columns)])
     rows = np.array([tuple(value for _, _, value in columns)] * count, dtype=layout)
-    stride = layout.itemsize + padding
     data = b"".join(row.tobytes() + bytes(padding) for row in rows)
     offsets = [layout.fields[str(index)][1] for index in range(len(columns))]  # type: ignore[index]
     fields = [
         PackedElementField(name=name, offset=offset, type=kind)  # type: ignore[arg-type]  # an enum's number
         for offset, (name, kind, _) in zip(offsets, columns, strict=True)
     ]
-    return PointCloud(point_stride=stride, fields=fields, data=data)
+    return PointCloud(point_stride=stride or layout.itemsize + padding, fields=fields, data=data)
 
 
 def refused(message: PointCloud) -> str:
@@ -113,7 +115,7 @@ def test_absolute_times_in_seconds_or_nanoseconds_are_taken_from_the_clouds_stam
 
 
 def test_absolute_times_without_a_stamp_are_refused() -> None:
-    assert "no stamp" in refused(cloud(*XYZ, ("timestamp", F64, 1_700_000_000.0)))
+    assert "the cloud has stamp None" in refused(cloud(*XYZ, ("timestamp", F64, 1_700_000_000.0)))
 
 
 def test_a_point_without_a_time_was_measured_at_the_stamp() -> None:
@@ -145,7 +147,37 @@ def test_a_length_that_is_no_whole_number_of_points_is_refused() -> None:
 
 
 def test_points_of_no_bytes_are_refused() -> None:
-    assert refused(PointCloud(data=b"1")) == "points of 0 bytes"
+    assert refused(PointCloud(data=b"1")) == "points of 0 fields and 0 bytes: up to 64, and 1 to 1024"
+
+
+def test_points_of_too_many_bytes_are_refused() -> None:
+    assert "points of 3 fields and 4294967295 bytes" in refused(cloud(*XYZ, stride=2**32 - 1))
+
+
+any_field = st.builds(
+    PackedElementField,
+    name=st.sampled_from(["x", "y", "z", "intensity", "ring", "t", "timestamp", ""]) | st.text(max_size=3),
+    offset=st.integers(0, 40) | st.integers(0, 2**32 - 1),
+    type=st.integers(-1, 10),
+)
+all_axes = st.just([PackedElementField(name=name, offset=0, type=F32) for name in ("x", "y", "z")])
+
+
+@given(
+    fields=st.tuples(all_axes | st.just([]), st.lists(any_field, max_size=5)).map(lambda parts: [*parts[0], *parts[1]]),
+    stride=st.integers(0, 40) | st.integers(0, 2**32 - 1),
+    data=st.binary(max_size=80),
+    seconds=st.none() | st.integers(-(2**63), 2**63 - 1),
+)
+@settings(max_examples=300, deadline=None, derandomize=True)
+def test_any_cloud_is_a_sweep_or_rejected(
+    fields: list[PackedElementField], stride: int, data: bytes, seconds: int | None
+) -> None:
+    message = PointCloud(fields=fields, point_stride=stride, data=data)
+    if seconds is not None:
+        message.timestamp.seconds = seconds
+    with contextlib.suppress(EventRejected):  # and nothing else
+        assert isinstance(cloud_event(message), PointsScanned)
 
 
 def test_a_field_named_twice_is_refused() -> None:

@@ -1,7 +1,7 @@
 """Messages come out in the order they were sent, whatever order they came in."""
 
 import random
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from hypothesis import given
@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from trigpoint.events.envelope import EventIdentity
 from trigpoint.events.runs import EncodedRun
-from trigpoint_ingest.core.ordering import DESCRIPTION_SCHEMA, HELD_LIMIT, RunOrder, described_first
+from trigpoint_ingest.core.ordering import DESCRIPTION_SCHEMA, HELD_BYTES, HELD_LIMIT, RunOrder, described_first
 
 
 @dataclass(frozen=True)
@@ -124,3 +124,10 @@ def test_a_file_without_description_is_not_held_in_memory_whole() -> None:
     endless = (numbered(sequence) for sequence in range(HELD_LIMIT + 1))
     message, known = next(described_first(endless))
     assert (message.identity.sequence, known) == (HELD_LIMIT, False)
+
+
+def test_large_messages_before_their_description_are_held_up_to_a_size() -> None:
+    half = bytes(HELD_BYTES // 2)
+    early = [replace(numbered(number), payload=half) for number in range(3)]
+    found = [(message.identity.sequence, described) for message, described in described_first([*early, description(3)])]
+    assert found == [(2, False), (3, True), (0, True), (1, True)]

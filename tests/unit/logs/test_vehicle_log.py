@@ -1,19 +1,32 @@
 import io
+import weakref
+from collections.abc import Iterator
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
-from event_examples.one_each import ONE_OF_EACH
+from event_examples.one_each import EVENTS, ONE_OF_EACH
 from event_examples.rows import START_NS, imu_row, imu_rows
 from trigpoint.errors import AppendFailed, InputError, LogDamaged
 from trigpoint.events.codec import decode
 from trigpoint.events.envelope import Envelope, EventIdentity
+from trigpoint.events.observed import Observed
+from trigpoint.events.scanned import PointsScanned
 from trigpoint.logs.mcap_scan import Damage
-from trigpoint.logs.vehicle_log import RawMessage, read_vehicle_log, read_whole_messages, write_vehicle_log
+from trigpoint.logs.vehicle_log import (
+    BATCH_SWEEPS,
+    RawMessage,
+    read_vehicle_log,
+    read_whole_messages,
+    write_vehicle_log,
+)
 
 CHUNK_HEAD_BYTES = 9 + 8 + 8 + 8 + 4 + 4 + len("zstd") + 8  # of a chunk record, before its data
 ROWS = imu_rows(0, 10_000)  # three chunks
@@ -202,3 +215,19 @@ def test_rows_of_a_vehicle_whose_boot_starts_anew_are_told_apart(tmp_path: Path)
     rows = [imu_row(0, boot_id="one"), imu_row(0, boot_id="two")]
     write_vehicle_log(tmp_path / "boots.mcap", rows, vehicle="van")  # type: ignore[arg-type]
     assert [row.identity.boot_id for row in read_vehicle_log(tmp_path / "boots.mcap")] == ["one", "two"]
+
+
+def test_sweeps_are_written_before_many_of_them_are_in_memory(tmp_path: Path) -> None:
+    sweep = next(event for event in EVENTS if isinstance(event, PointsScanned))
+    alive: list[int] = []
+    made: list[weakref.ref[np.ndarray[Any, Any]]] = []
+
+    def rows() -> Iterator[Envelope[Observed]]:
+        for number in range(5 * BATCH_SWEEPS):
+            one = replace(sweep, ring=sweep.ring.copy())
+            made.append(weakref.ref(one.ring))
+            alive.append(sum(kept() is not None for kept in made))
+            yield Envelope(EventIdentity("van", "boot-1", number), START_NS + number, one)
+
+    write_vehicle_log(tmp_path / "van.mcap", rows(), vehicle="van")
+    assert max(alive) <= 2 * BATCH_SWEEPS

@@ -11,7 +11,6 @@ from trigpoint.errors import InputError
 from trigpoint.events.drives import drives_of
 from trigpoint.events.observed import LandmarksDetected
 from trigpoint.geodesy.projection import map_points_from_wgs84, pin_map_frame
-from trigpoint_vehicle.app import read_source
 from trigpoint_vehicle.core.mrclam import (
     BARCODES,
     CRS,
@@ -24,6 +23,7 @@ from trigpoint_vehicle.core.mrclam import (
 )
 from trigpoint_vehicle.core.recording import Conversion
 from trigpoint_vehicle.core.text_tables import SourceText
+from trigpoint_vehicle.source_files import read_source
 
 WORN = SourceText(BARCODES, "# Subject #    Barcode #\n  1 \t   5\n  2 \t  14\n  6 \t  63\n")
 SURVEY = SourceText(LANDMARKS, "# head\n  6 \t 0.588 \t -4.282 \t 0.00004570 \t 0.00027395\n")

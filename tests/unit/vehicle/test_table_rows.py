@@ -11,11 +11,11 @@ from trigpoint.events.drives import Drive, drives_of
 from trigpoint.events.observed import LandmarksDetected
 from trigpoint.geodesy.positions import Wgs84Position
 from trigpoint.geodesy.projection import map_points_from_wgs84, pin_map_frame_at
-from trigpoint_vehicle.app import read_source
 from trigpoint_vehicle.core.recording import Conversion
 from trigpoint_vehicle.core.table_manifest import parsed_manifest
 from trigpoint_vehicle.core.table_rows import converted_tables
 from trigpoint_vehicle.core.text_tables import SourceText
+from trigpoint_vehicle.source_files import read_source
 
 NCLT = Path(__file__).parents[2] / "figures" / "nclt.toml"
 

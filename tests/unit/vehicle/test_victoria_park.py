@@ -11,9 +11,9 @@ from trigpoint.events.drives import Drive, drives_of
 from trigpoint.events.observed import LandmarksDetected
 from trigpoint.geodesy.positions import GridPosition
 from trigpoint.geodesy.projection import map_points_from_wgs84, pin_map_frame
-from trigpoint_vehicle.app import read_source
 from trigpoint_vehicle.core.text_tables import SourceText
 from trigpoint_vehicle.core.victoria_park import FILES, FIRST_STAMP_NS, victoria_park
+from trigpoint_vehicle.source_files import read_source
 
 GPS = SourceText("gps.dat", "  0.000  -2.0  1000.0\n  1.001  -2.1  1000.2\n")
 INPUTS = SourceText("inputs.dat", "  0.973  2.000  -0.0035\n  0.998  2.100  -0.0042\n")

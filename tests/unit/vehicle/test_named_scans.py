@@ -1,0 +1,165 @@
+"""Scans that a manifest names stand in a vehicle's log among what its tables say."""
+
+from pathlib import Path
+
+import laspy
+import numpy as np
+import pytest
+
+from trigpoint.errors import InputError
+from trigpoint.events.codec import decode
+from trigpoint.events.observed import GnssFixReceived, VehicleDescribed
+from trigpoint.events.scanned import PointsScanned
+from trigpoint.logs.vehicle_log import read_vehicle_log
+from trigpoint_vehicle.app import Written, convert_table
+
+START_NS = 1_700_000_000_000_000_000
+MANIFEST = """
+[[vehicle]]
+name = "van"
+file = "fixes.csv"
+fixes = {{ time = {{ column = "t_ns", unit = "ns" }}, lat = "lat", lon = "lon" }}
+
+[vehicle.sweeps]
+sensor = "roof"
+position_m = [0.4, 0.0, 1.9]
+yaw_deg = 90.0
+{sweeps}
+"""
+LISTED = 'file = "scans/*.bin"\ntime = { column = "stem", unit = "ns" }'
+POINTS = np.array([[1.0, 2.0, 3.0, 0.5], [4.0, 5.0, 6.0, 0.25]], dtype=np.float32)
+
+
+def drive(folder: Path, sweeps: str = LISTED) -> Path:
+    """Two fixes, and a scan before, between and after them."""
+    (folder / "scans").mkdir()
+    for offset_ns in (0, 10, 20):
+        (folder / f"scans/{START_NS + offset_ns}.bin").write_bytes(POINTS.tobytes())
+    (folder / "fixes.csv").write_text(f"t_ns,lat,lon\n{START_NS + 5},-33.9,151.2\n{START_NS + 15},-33.9,151.2\n")
+    manifest = folder / "drive.toml"
+    manifest.write_text(MANIFEST.format(sweeps=sweeps))
+    return manifest
+
+
+def converted(manifest: Path) -> tuple[Written, list[tuple[int, object]]]:
+    written = convert_table(manifest, manifest.parent / "out")
+    messages = read_vehicle_log(written.logs[0])
+    return written, [(one.stamp_ns - START_NS, decode(one.schema_name, one.payload)) for one in messages]
+
+
+def sweeps_of(manifest: Path) -> list[PointsScanned]:
+    return [event for _, event in converted(manifest)[1] if isinstance(event, PointsScanned)]
+
+
+def test_scans_listed_by_a_pattern_stand_among_the_fixes_in_order_of_time(tmp_path: Path) -> None:
+    _, rows = converted(drive(tmp_path))
+    kinds = [VehicleDescribed, PointsScanned, GnssFixReceived, PointsScanned, GnssFixReceived, PointsScanned]
+    assert [(stamp_ns, type(event)) for stamp_ns, event in rows] == list(zip([0, 0, 5, 10, 15, 20], kinds, strict=True))
+
+
+def test_messages_are_numbered_without_gaps(tmp_path: Path) -> None:
+    written, _ = converted(drive(tmp_path))
+    assert [one.identity.sequence for one in read_vehicle_log(written.logs[0])] == list(range(6))
+
+
+def test_the_lidar_stands_as_the_manifest_says(tmp_path: Path) -> None:
+    sweep = sweeps_of(drive(tmp_path))[0]
+    assert (sweep.sensor, sweep.sensor_position_m.tolist()) == ("roof", [0.4, 0.0, 1.9])
+    assert sweep.sensor_orientation == pytest.approx([0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)])
+
+
+def test_a_table_may_name_the_scans_and_their_times(tmp_path: Path) -> None:
+    (tmp_path / "stamps.csv").write_text(f"when,cloud\n1700000000.5,scans/{START_NS}.bin\n")
+    manifest = drive(tmp_path, 'file = "stamps.csv"\ntime = "when"\nscan = "cloud"')
+    stamps = [stamp_ns for stamp_ns, event in converted(manifest)[1] if isinstance(event, PointsScanned)]
+    assert stamps == [500_000_000]
+
+
+def test_a_scan_that_is_missing_is_left_aside_and_the_others_are_written(tmp_path: Path) -> None:
+    (tmp_path / "stamps.csv").write_text(f"t,scan\n1,scans/{START_NS}.bin\n2,scans/gone.bin\n")
+    written, rows = converted(drive(tmp_path, 'file = "stamps.csv"\ntime = "t"'))
+    assert sum(isinstance(event, PointsScanned) for _, event in rows) == 1
+    assert dict(written.left_aside.counts) == {"unreadable scan": 1}
+    assert "gone.bin: cannot be read" in written.left_aside.complaints()[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "why"),
+    [
+        ("a.bin", bytes(17), "17 bytes are no whole number of points of 16 bytes"),
+        ("a.pcd", b"nothing", "no PCD file"),
+        ("a.laz", b"nothing", "no LAS or LAZ file that can be read"),
+        ("a.xyz", b"1 2 3", ".xyz is none of .pcd, .bin, .las, .laz"),
+    ],
+)
+def test_a_file_that_holds_no_points_is_left_aside(tmp_path: Path, name: str, content: bytes, why: str) -> None:
+    (tmp_path / name).write_bytes(content)
+    (tmp_path / "stamps.csv").write_text(f"t,scan\n1,{name}\n")
+    written, _ = converted(drive(tmp_path, 'file = "stamps.csv"\ntime = "t"'))
+    assert why in written.left_aside.complaints()[0]
+
+
+def test_a_pcd_file_without_z_is_left_aside_with_its_reason(tmp_path: Path) -> None:
+    (tmp_path / "a.pcd").write_text("FIELDS x y\nSIZE 4 4\nTYPE F F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n1 2\n")
+    (tmp_path / "stamps.csv").write_text("t,scan\n1,a.pcd\n")
+    written, _ = converted(drive(tmp_path, 'file = "stamps.csv"\ntime = "t"'))
+    assert dict(written.left_aside.counts) == {"undecodable": 1}
+
+
+def las(path: Path, *, time_s: tuple[float, ...]) -> Path:
+    """Two points about 652,000 east and 6,862,000 north, with GPS times."""
+    header = laspy.LasHeader(point_format=1, version="1.4")
+    header.offsets, header.scales = np.array([652_000.0, 6_862_000.0, 0.0]), np.full(3, 0.001)
+    data = laspy.LasData(header)
+    data.x, data.y = np.array([652_001.5, 652_002.5]), np.array([6_862_003.0, 6_862_004.0])
+    data.z, data.intensity, data.gps_time = np.array([5.0, 6.0]), np.array([700, 800]), np.array(time_s)
+    data.write(path)
+    return path
+
+
+@pytest.mark.parametrize("suffix", ["las", "laz"])
+def test_a_las_files_points_are_taken_from_its_origin_with_their_times(tmp_path: Path, suffix: str) -> None:
+    las(tmp_path / f"a.{suffix}", time_s=(1000.0, 1000.25))
+    (tmp_path / "stamps.csv").write_text(f"t,scan\n1,a.{suffix}\n")
+    told = 'file = "stamps.csv"\ntime = "t"\norigin_m = [652000, 6862000, 0]\npoint_times = "gps_time"'
+    (sweep,) = sweeps_of(drive(tmp_path, told))
+    assert sweep.point_m.tolist() == [[1.5, 3.0, 5.0], [2.5, 4.0, 6.0]]
+    assert (sweep.intensity.tolist(), sweep.offset_ns.tolist()) == ([700.0, 800.0], [0, 250_000_000])
+
+
+def test_a_las_file_that_takes_minutes_is_no_scan_of_its_points_times(tmp_path: Path) -> None:
+    las(tmp_path / "a.las", time_s=(1000.0, 1060.0))
+    (tmp_path / "stamps.csv").write_text("t,scan\n1,a.las\n")
+    told = 'file = "stamps.csv"\ntime = "t"\npoint_times = "gps_time"'
+    written, _ = converted(drive(tmp_path, told))
+    assert "a point 60 s after the first of its scan, limit 2.147 s" in written.left_aside.complaints()[0]
+
+
+def test_a_pattern_without_files_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"no file scans/\*.las"):
+        convert_table(drive(tmp_path, LISTED.replace(".bin", ".las")), tmp_path / "out")
+
+
+def test_scans_without_a_path_are_refused(tmp_path: Path) -> None:
+    manifest = drive(tmp_path)
+    text = "\n".join(line for line in manifest.read_text().splitlines() if not line.startswith("fixes"))
+    manifest.write_text(text)
+    with pytest.raises(InputError, match="vehicle 'van' has sweeps without a path"):
+        convert_table(manifest, tmp_path / "out")
+
+
+def test_a_file_name_that_is_no_time_is_refused_with_its_row(tmp_path: Path) -> None:
+    manifest = drive(tmp_path)
+    (tmp_path / "scans/first.bin").write_bytes(b"")
+    with pytest.raises(InputError, match="row 5: stem is 'first', not a time"):
+        convert_table(manifest, tmp_path / "out")
+
+
+@pytest.mark.data
+def test_an_airborne_tile_is_read_whole(recorded_drives: Path, tmp_path: Path) -> None:
+    tile = recorded_drives / "ign_lidar_hd/test_data_77055_627760_LA93_IGN69.laz"
+    (tmp_path / "stamps.csv").write_text(f"t,scan\n1,{tile}\n")
+    manifest = drive(tmp_path, 'file = "stamps.csv"\ntime = "t"\norigin_m = [770575, 6277575, 0]')
+    (sweep,) = sweeps_of(manifest)
+    assert sweep.point_m.shape == (60_653, 3)
+    assert np.abs(sweep.point_m[:, :2]).max() <= 25.1  # m: a tile of 50 m about its middle
