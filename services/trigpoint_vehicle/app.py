@@ -67,12 +67,11 @@ def write_conversion(conversion: Conversion, out_dir: Path, scans: VehicleScans 
     try:
         out_dir.mkdir(parents=True, exist_ok=True)
         logs = tuple(_written_logs(conversion, out_dir, scans or VehicleScans()))
+        anchors = anchors_geojson(conversion.anchors) if conversion.anchors else None
         return Written(
             logs=logs,
             truth=_written(out_dir / TRUTH_NAME, truth_lines(known)) if has_truth else None,
-            anchors=_written(out_dir / ANCHORS_NAME, anchors_geojson(conversion.anchors))
-            if conversion.anchors
-            else None,
+            anchors=None if anchors is None else _written(out_dir / ANCHORS_NAME, anchors),
             objects=_written(out_dir / OBJECTS_NAME, object_lines(conversion.objects)) if conversion.objects else None,
             left_aside=LeftAside() if scans is None else scans.left_aside,
         )
