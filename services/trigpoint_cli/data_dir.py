@@ -124,6 +124,10 @@ data_option: Callable[[Any], Any] = click.option(
     help="The data directory.",
 )
 
+cluster_option: Callable[[Any], Any] = click.option(
+    "--cluster", default="", metavar="ADDRESS", help="A Dask scheduler, tcp://…, whose workers see the same files."
+)
+
 as_of_option: Callable[[Any], Any] = click.option(
     "--as-of", type=int, metavar="VERSION", help="The map version, the newest by default."
 )

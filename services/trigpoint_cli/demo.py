@@ -3,12 +3,15 @@
 import os
 import shutil
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
 from trigpoint.errors import InputError
+from trigpoint.logs.mcap_log import McapLog
+from trigpoint.workers import workers
 from trigpoint_cli.build import map_values
 from trigpoint_cli.data_dir import DataDirectory
 from trigpoint_cli.ingest import ingest_values
@@ -61,8 +64,8 @@ def command(out: Path, *, aerial: bool, screen: Screen, **simulated: Any) -> Ans
             ingested = ingest_live(logs, log, progress)
         import_anchors(read_anchor_file(data.anchors), log)
         if settings.lidar:
-            with screen.part_of("perceiving") as progress:
-                perceive_log(log, progress=progress)
+            with workers() as some, screen.part_of("perceiving") as progress:
+                perceive_log(log, partial(McapLog, data.log), some=some, progress=progress)
         built = build_map(data, log, screen, method="anchored")
         found = write_report(data, log, screen, truth_path=data.truth, built=built)
     assert found is not None, "truth was written above"

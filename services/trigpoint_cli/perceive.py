@@ -1,25 +1,30 @@
 """`trigpoint perceive`: the landmarks and motions that lidar sweeps show."""
 
+from functools import partial
+
 import click
 
 from trigpoint.errors import InputError
-from trigpoint_cli.data_dir import DataDirectory, data_option
+from trigpoint.logs.mcap_log import McapLog
+from trigpoint.workers import workers
+from trigpoint_cli.data_dir import DataDirectory, cluster_option, data_option
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering, counted
 from trigpoint_perception.app import DriveReport, perceive_log
 
 
 @click.command("perceive")
 @data_option
+@cluster_option
 @answering
-def command(data: DataDirectory, *, screen: Screen) -> Answer:
+def command(data: DataDirectory, *, cluster: str, screen: Screen) -> Answer:
     """Search the sweeps of every drive that is not excluded for poles and building corners, and match them for
     odometry; what was said already is not said again.
 
     Sweeps that cannot be used are counted by reason, kept with it in the log, and end the command with status 2 after
     everything else was done.
     """
-    with data.opened_log() as log, screen.part_of("perceiving") as progress:
-        reports = perceive_log(log, progress=progress)
+    with data.opened_log() as log, workers(cluster) as some, screen.part_of("perceiving") as progress:
+        reports = perceive_log(log, partial(McapLog, data.log.absolute()), some=some, progress=progress)
     if not reports:
         raise InputError(f"{data.log}: no drive has lidar sweeps, or all that have are excluded")
     complaints = tuple(

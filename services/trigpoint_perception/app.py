@@ -2,10 +2,12 @@
 
 import logging
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import cast
 
+from trigpoint.errors import ServiceError
 from trigpoint.events.codec import Event
 from trigpoint.events.corrected import excluded_drives
 from trigpoint.events.drives import drives_of
@@ -22,6 +24,7 @@ from trigpoint.events.perceived import LandmarksPerceived, Perceived
 from trigpoint.events.scanned import PointsScanned
 from trigpoint.logs.ports import EventLog
 from trigpoint.logs.readings import Progress, in_silence, logged_corrections, vehicle_streams
+from trigpoint.workers import Tally, Workers
 from trigpoint_perception.core.deskew import Path
 from trigpoint_perception.core.following import NumberedSweep, SweepFollower
 from trigpoint_perception.core.motion_prior import wheel_path
@@ -46,6 +49,11 @@ class ScannedDrive:
     sweeps: int
     wheels: Path | None
 
+    @property
+    def name(self) -> tuple[str, str]:
+        """Vehicle and boot."""
+        return self.vehicle, self.boot_id
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveReport:
@@ -64,25 +72,56 @@ class DriveReport:
 
 
 def perceive_log(
-    log: EventLog, settings: PerceptionSettings | None = None, *, progress: Progress = in_silence
+    log: EventLog,
+    open_log: Callable[[], EventLog],
+    settings: PerceptionSettings | None = None,
+    *,
+    some: Workers,
+    progress: Progress = in_silence,
 ) -> tuple[DriveReport, ...]:
-    """The sweeps of every drive that is not excluded searched, and told of; again: nothing is appended twice.
+    """The sweeps of every drive that is not excluded searched, drive by drive by some workers, each of which opens the
+    log to read it; told of in `log`; again: nothing is appended twice.
 
-    A sweep that cannot be used is told of with the reason, and the others go on. Raises AppendFailed.
+    A sweep that cannot be used is told of with the reason, and the others go on; a drive that cannot be read or ended
+    its workers costs no other. Raises AppendFailed, and once all others are done ServiceError for those drives.
     """
     chosen, said, drives = settings or PerceptionSettings(), said_of(log), scanned_drives(log)
-    total = sum(drive.sweeps for drive in drives)
-    done, reports = 0, []
-    for drive in drives:
+    before = {drive.name: said.get(output_boot_id(*drive.name, chosen), Said()) for drive in drives}
+    reports = {drive.name: _report(drive, before[drive.name], appended=0) for drive in drives}
+    due = [drive for drive in drives if before[drive.name].sweeps != drive.sweeps]
+    heard = Tally(sum(drive.sweeps for drive in due), progress)
+    searched = partial(told_of, open_log, chosen, heard=heard.more if some.are_here else None)
+    failures = []
+    for done in some.each(searched, due):
+        drive = done.item
+        if done.result is None:
+            failures.append(f"drive {drive.boot_id} of {drive.vehicle}: {done.error}")
+            continue
+        if not some.are_here:
+            heard.more(drive.sweeps)
+        reports[drive.name] = _appended(log, drive, done.result, before[drive.name], chosen)
+    if failures:
+        raise ServiceError(f"{len(failures)} of {len(due)} drives not perceived: {'; '.join(failures)}")
+    return tuple(reports.values())
 
-        def heard(count: int, _: int, before: int = done) -> None:
-            progress(before + count, total)
 
-        before = said.get(output_boot_id(drive.vehicle, drive.boot_id, chosen), Said())
-        reports.append(_perceived(log, drive, chosen, before, heard))
-        done += drive.sweeps
-        progress(done, total)
-    return tuple(reports)
+def told_of(
+    open_log: Callable[[], EventLog],
+    settings: PerceptionSettings,
+    drive: ScannedDrive,
+    *,
+    heard: Callable[[int], None] | None = None,
+) -> list[tuple[int, Perceived]]:
+    """Every event of a drive with its stamp; `heard` is told of each sweep."""
+    log = open_log()
+    try:
+        return list(_told(log, drive, settings, heard or _in_silence))
+    finally:
+        log.close()
+
+
+def _in_silence(count: int) -> None:
+    """Nobody is told."""
 
 
 def scanned_drives(log: EventLog) -> tuple[ScannedDrive, ...]:
@@ -117,40 +156,35 @@ def _wheel_paths(log: EventLog, stream: str) -> dict[tuple[str, str], Path | Non
     return {(drive.vehicle, drive.boot_id): wheel_path(drive) for drive in drives_of(rows)}
 
 
-def _perceived(
-    log: EventLog, drive: ScannedDrive, settings: PerceptionSettings, before: Said, progress: Progress
+def _appended(
+    log: EventLog,
+    drive: ScannedDrive,
+    told: Sequence[tuple[int, Perceived]],
+    before: Said,
+    settings: PerceptionSettings,
 ) -> DriveReport:
-    if before.sweeps == drive.sweeps:
-        return _report(drive, before, appended=0)
-    whole, fresh, appended = Said(), [], 0
-    boot_id = output_boot_id(drive.vehicle, drive.boot_id, settings)
-    for stamp_ns, event in _told(log, drive, settings, progress):
+    """What was not there yet appended."""
+    whole = Said()
+    for _, event in told:
         whole.add(event)
-        if whole.count > before.count:
-            fresh.append((stamp_ns, event))
-        if len(fresh) == APPENDED_TOGETHER:
-            appended += _append(log, fresh, boot_id=boot_id, end=whole.count)
-            fresh = []
-    appended += _append(log, fresh, boot_id=boot_id, end=whole.count)
+    boot_id = output_boot_id(drive.vehicle, drive.boot_id, settings)
+    for first in range(before.count, len(told), APPENDED_TOGETHER):
+        _append(log, told[first : first + APPENDED_TOGETHER], boot_id=boot_id, first_sequence=first)
     for reason, count in sorted(whole.refused.items()):
         logger.warning("drive %s of %s: %d sweeps refused: %s", drive.boot_id, drive.vehicle, count, reason)
-    return _report(drive, whole, appended=appended)
+    return _report(drive, whole, appended=max(0, len(told) - before.count))
 
 
-def _append(log: EventLog, told: list[tuple[int, Perceived]], *, boot_id: str, end: int) -> int:
-    if told:
-        log.append(
-            STREAM, cast(list[Envelope[Event]], list(numbered(told, boot_id=boot_id, first_sequence=end - len(told))))
-        )
-    return len(told)
+def _append(log: EventLog, told: Sequence[tuple[int, Perceived]], *, boot_id: str, first_sequence: int) -> None:
+    rows = numbered(told, boot_id=boot_id, first_sequence=first_sequence)
+    log.append(STREAM, cast(list[Envelope[Event]], list(rows)))
 
 
 def _told(
-    log: EventLog, drive: ScannedDrive, settings: PerceptionSettings, progress: Progress
+    log: EventLog, drive: ScannedDrive, settings: PerceptionSettings, heard: Callable[[int], None]
 ) -> Iterator[tuple[int, Perceived]]:
     """Every event of a drive, each sensor followed by itself."""
     followers: dict[str, SweepFollower] = {}
-    done = 0
     for logged in log.read(drive.stream, kinds=(PointsScanned,)):
         envelope = cast(Envelope[PointsScanned], logged.envelope)
         if envelope.identity.boot_id != drive.boot_id:
@@ -161,8 +195,7 @@ def _told(
             followers[envelope.event.sensor] = follower
         sequence = envelope.identity.sequence
         yield from follower.take(NumberedSweep(sequence=sequence, stamp_ns=envelope.stamp_ns, scanned=envelope.event))
-        done += 1
-        progress(done, drive.sweeps)
+        heard(1)
     for follower in followers.values():
         yield from follower.finished()
 

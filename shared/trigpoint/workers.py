@@ -2,6 +2,7 @@
 home."""
 
 import os
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
@@ -28,11 +29,25 @@ class Done(Generic[Item, Result]):
     error: BaseException | None = None
 
 
-class Workers:
-    """Does pieces of work; made by `workers`. `threads`: how many are at work at once."""
+class Tally:
+    """How much of a total is done, told by several threads."""
 
-    def __init__(self, executor: Executor, threads: int) -> None:
-        self._executor, self.threads = executor, threads
+    def __init__(self, total: int, progress: Callable[[int, int], None]) -> None:
+        self._total, self._progress = total, progress
+        self._done, self._lock = 0, threading.Lock()
+
+    def more(self, count: int) -> None:
+        """So much more is done; the progress is told."""
+        with self._lock:
+            self._done += count
+            self._progress(self._done, self._total)
+
+
+class Workers:
+    """Does pieces of work; made by `workers`. `threads`: how many are at work at once; `are_here`: in this process."""
+
+    def __init__(self, executor: Executor, threads: int, *, are_here: bool) -> None:
+        self._executor, self.threads, self.are_here = executor, threads, are_here
 
     def each(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Done[Item, Result]]:
         """Every item worked on, in the order they end in; items are drawn only as threads come free.
@@ -77,7 +92,7 @@ def workers(cluster: str = "", *, threads: int = 0) -> Iterator[Workers]:
         return
     count = threads or os.cpu_count() or 1
     with ThreadPoolExecutor(count, thread_name_prefix="worker") as executor:
-        yield Workers(executor, count)
+        yield Workers(executor, count, are_here=True)
 
 
 @contextmanager
@@ -95,4 +110,4 @@ def _elsewhere(cluster: str) -> Iterator[Workers]:
         if not threads:
             raise ServiceError(f"the Dask scheduler at {cluster} has no workers")
         with client.get_executor(pure=False) as executor:
-            yield Workers(executor, threads)
+            yield Workers(executor, threads, are_here=False)

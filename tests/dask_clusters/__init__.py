@@ -1,1 +1,1 @@
-"""Pieces of work for the processes of a Dask cluster."""
+"""A Dask cluster of processes on loopback, and pieces of work for it."""

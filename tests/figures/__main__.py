@@ -25,6 +25,7 @@ from figures import (
     projection,
     query,
     relocalise,
+    scale,
     security,
     security_fuzz,
     victoria_park,
@@ -54,6 +55,7 @@ GROUPS: Mapping[str, Sequence[Figure]] = {
     "viewer": viewer.FIGURES,
     "ortho": ortho.FIGURES,
     "relocalise": relocalise.FIGURES,
+    "scale": scale.FIGURES,
     "security": (*security.FIGURES, *security_fuzz.FIGURES),
 }
 PROGRAM = (str(Path(sys.executable).with_name("trigpoint")),)

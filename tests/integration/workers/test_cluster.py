@@ -1,53 +1,24 @@
 """Independent pieces of work on a Dask cluster of processes: a worker's death costs only what ends workers."""
 
 import os
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from command_runs.processes import free_ports, wait_until
+from command_runs.processes import free_ports
+from dask_clusters.cluster import running_workers
 from dask_clusters.pieces import deadly, deadly_once, squared
 from trigpoint.errors import ServiceError
 from trigpoint.workers import Workers, workers
 
 WORKERS = 2
-BEGUN_S = 60.0  # a scheduler and two workers, each with a nanny
 
 
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """The address of a scheduler on loopback with two workers, each a process of one thread."""
-    folder = tmp_path_factory.mktemp("cluster")
-    address = f"tcp://127.0.0.1:{free_ports(1)[0]}"
-    host, port = address.removeprefix("tcp://").split(":")
-    scheduler = ("dask_scheduler", "--host", host, "--port", port, "--no-dashboard")
-    worker = ("dask_worker", address, "--nworkers", str(WORKERS), "--nthreads", "1", "--no-dashboard")
-    begun = [program(folder, *scheduler), program(folder, *worker, "--local-directory", str(folder))]
-    try:
-        wait_until(lambda: worker_count(address) == WORKERS, "two workers", within_s=BEGUN_S)
+    with running_workers(tmp_path_factory.mktemp("cluster"), WORKERS) as address:
         yield address
-    finally:
-        for process in reversed(begun):
-            process.terminate()
-            process.wait()
-
-
-def program(folder: Path, name: str, *arguments: str) -> subprocess.Popen[bytes]:
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    with (folder / f"{name}.err").open("wb") as output:
-        command = [sys.executable, "-m", f"distributed.cli.{name}", *arguments]
-        return subprocess.Popen(command, env=environment, stdout=output, stderr=output)
-
-
-def worker_count(address: str) -> int:
-    try:
-        with workers(address) as found:
-            return found.threads
-    except ServiceError:
-        return 0
 
 
 @pytest.fixture
@@ -74,7 +45,7 @@ def test_a_piece_that_ends_every_worker_costs_no_other(some: Workers) -> None:
     assert {item: one.result for item, one in done.items()} == {number: number for number in range(10)}
 
 
-def test_no_scheduler_is_an_error_that_names_where(tmp_path: Path) -> None:
+def test_no_scheduler_is_an_error_that_names_where() -> None:
     address = f"tcp://127.0.0.1:{free_ports(1)[0]}"
     with pytest.raises(ServiceError, match=f"no Dask scheduler answers at {address}"), workers(address):
         pass
