@@ -1,0 +1,1 @@
+"""What perception finds along a simulated street, held against what stands there."""
