@@ -46,16 +46,30 @@ class Tally:
 class Workers:
     """Does pieces of work; made by `workers`. `threads`: how many are at work at once; `are_here`: in this process."""
 
-    def __init__(self, executor: Executor, threads: int, *, are_here: bool) -> None:
-        self._executor, self.threads, self.are_here = executor, threads, are_here
+    def __init__(
+        self, executor: Executor, threads: int, *, are_here: bool, blamed: tuple[type[Exception], ...] = ()
+    ) -> None:
+        """`blamed`: the errors of a piece several of whose workers died."""
+        self._executor, self.threads, self.are_here, self._blamed = executor, threads, are_here, blamed
 
     def each(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Done[Item, Result]]:
         """Every item worked on, in the order they end in; items are drawn only as threads come free.
 
-        An error ends its own piece only. A piece whose worker died is done again by another one; where it ends several
-        workers it is given up, with distributed.KilledWorker for error. For workers elsewhere `work`, items and
+        An error ends its own piece only. A piece whose worker died is done again by another one. Where several of its
+        workers died it may only have been beside what ended them: it is done again by itself, at the end, and given up
+        if that ends workers too, with distributed.KilledWorker for error. For workers elsewhere `work`, items and
         results are pickled, and work done twice must do no harm. Who leaves early leaves nothing waiting behind.
         """
+        suspects: list[Item] = []
+        for done in self._ended(work, items):
+            if isinstance(done.error, self._blamed):
+                suspects.append(done.item)
+            else:
+                yield done
+        for item in suspects:
+            yield from self._ended(work, [item])
+
+    def _ended(self, work: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Done[Item, Result]]:
         waiting = iter(items)
         under_way: dict[Future[Result], Item] = {}
         try:
@@ -110,4 +124,4 @@ def _elsewhere(cluster: str) -> Iterator[Workers]:
         if not threads:
             raise ServiceError(f"the Dask scheduler at {cluster} has no workers")
         with client.get_executor(pure=False) as executor:
-            yield Workers(executor, threads, are_here=False)
+            yield Workers(executor, threads, are_here=False, blamed=(distributed.KilledWorker,))
