@@ -32,17 +32,18 @@ def main() -> None:
     parser.add_argument("--rate-hz", type=float, required=True)
     parser.add_argument("--taken", type=Path, required=True)
     options = parser.parse_args()
-    stop = threading.Event()
-    signal.signal(signal.SIGTERM, lambda *_: stop.set())
+    told: list[int] = []  # signals; an event set by a handler would wait for the thread it interrupted
+    signal.signal(signal.SIGTERM, lambda number, _: told.append(number))
+    pause = threading.Event()
     taken = os.open(options.taken, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     bus = ZenohSettings(connect=(options.connect,))
     with VehiclePublisher(options.vehicle, options.spool, bus, VehicleSettings()) as publisher:
         identity = publisher.describe(VehicleDescribed(vehicle=options.vehicle), stamp_ns=time.time_ns())
         began_s, count = time.monotonic(), 0
-        while not stop.is_set():
+        while not told:
             os.write(taken, f"{identity.boot_id} {identity.sequence}\n".encode())
             count += 1
-            stop.wait(max(began_s + count / options.rate_hz - time.monotonic(), 0.0))
+            pause.wait(max(began_s + count / options.rate_hz - time.monotonic(), 0.0))
             identity = publisher.send(measured(count), stamp_ns=time.time_ns())
         os.write(taken, f"{identity.boot_id} {identity.sequence}\n".encode())
         sys.exit(0 if publisher.flush(300.0) else 1)
