@@ -39,7 +39,7 @@ def listed_files(folder: Path, pattern: str) -> SourceText:
     """
     try:
         paths = sorted(path.relative_to(folder).as_posix() for path in folder.glob(pattern))
-    except (ValueError, NotImplementedError, OSError) as error:
+    except (ValueError, NotImplementedError, OSError) as error:  # empty, absolute, or a folder that cannot be read
         raise InputError(f"{folder}: {pattern!r} is no pattern of files in it: {error}") from error
     if not paths:
         raise InputError(f"{folder}: no file {pattern}")
