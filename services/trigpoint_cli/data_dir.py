@@ -114,14 +114,29 @@ def _directory(context: click.Context, parameter: click.Parameter, value: Path) 
     return DataDirectory(value, asked_database(context))
 
 
+def _directories(
+    context: click.Context, parameter: click.Parameter, value: tuple[Path, ...]
+) -> tuple[DataDirectory, ...]:
+    return tuple(_directory(context, parameter, path) for path in value)
+
+
+_AS_DIRECTORY: dict[str, Any] = {
+    "required": True,
+    "envvar": "TRIGPOINT_FLEET__DATA",
+    "metavar": "DIR",
+    "type": click.Path(path_type=Path),
+}
+
 data_option: Callable[[Any], Any] = click.option(
+    "--data", callback=_directory, help="The data directory.", **_AS_DIRECTORY
+)
+
+several_data_option: Callable[[Any], Any] = click.option(
     "--data",
-    required=True,
-    envvar="TRIGPOINT_FLEET__DATA",
-    metavar="DIR",
-    type=click.Path(path_type=Path),
-    callback=_directory,
-    help="The data directory.",
+    multiple=True,
+    callback=_directories,
+    help="A data directory; more than one may be named.",
+    **_AS_DIRECTORY,
 )
 
 cluster_option: Callable[[Any], Any] = click.option(

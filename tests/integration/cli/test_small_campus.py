@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from command_runs.running import Run, trigpoint
 from command_runs.small_campus import LABELS, write_small_campus
+from dask_clusters.cluster import running_workers
 from trigpoint.events.mapped import TrajectorySolved
 from trigpoint.events.solved import SolvedMap
 from trigpoint.logs.mcap_log import McapLog
@@ -216,6 +217,31 @@ def test_what_people_corrected_is_listed_and_undone(campus: BuiltCampus, tmp_pat
 def test_replay_finds_no_difference(campus: BuiltCampus) -> None:
     said = trigpoint("replay", "--data", campus.data, "--json")
     assert (said.status, said.answer["differences"]) == (0, 0)
+
+
+def test_several_logs_are_replayed_and_one_that_cannot_be_read_costs_no_other(
+    campus: BuiltCampus, tmp_path: Path
+) -> None:
+    other, missing = shutil.copytree(campus.data, tmp_path / "other"), tmp_path / "missing"
+    said = trigpoint("replay", "--data", campus.data, "--data", missing, "--data", other, "--json")
+    assert said.status == 2
+    assert [one["data"] for one in said.answer["data"]] == [str(campus.data), str(missing), str(other)]
+    assert [one.get("differences") for one in said.answer["data"]] == [0, None, 0]
+    assert f"{missing}: no such data directory" in said.answer["data"][1]["error"]
+
+
+def test_a_log_is_replayed_by_a_worker_elsewhere(campus: BuiltCampus, tmp_path: Path) -> None:
+    with running_workers(tmp_path, 1) as address:
+        said = trigpoint("replay", "--data", campus.data, "--cluster", address, "--json")
+    assert (said.status, said.answer["differences"]) == (0, 0)
+    assert [one["data"] for one in said.answer["data"]] == [str(campus.data)]
+
+
+def test_one_database_is_not_held_against_two_logs(campus: BuiltCampus, tmp_path: Path) -> None:
+    url = f"geopackage:{tmp_path / 'map.gpkg'}"
+    said = trigpoint("replay", "--data", campus.data, "--data", tmp_path, "--database", url, "--json")
+    assert said.status == 2
+    assert "each has its own" in said.answer["error"]
 
 
 def test_the_log_is_whole_and_says_what_it_holds(campus: BuiltCampus) -> None:
