@@ -8,7 +8,7 @@ VIEWER := services/trigpoint_landmarks/viewer
 VIEWER_PACKAGES := $(VIEWER)/node_modules/.package-lock.json
 VIEWER_BUILT := $(VIEWER)/dist/index.html
 WORKERS ?= 2
-PYTEST := $(BIN)/pytest $(if $(CI),--forbid-skipped=postgis --forbid-skipped=browser)
+PYTEST := $(BIN)/pytest $(if $(CI),--forbid-skipped=postgis --forbid-skipped=browser --forbid-skipped=qgis)
 
 .DEFAULT_GOAL := help
 .PHONY: help demo viewer viewer-where-possible test test-all check format-check lint types contracts format figures schemas readme system-tools clean

@@ -63,6 +63,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def pytest_runtest_setup(item: pytest.Item) -> None:
     if item.get_closest_marker("data") and not RECORDED_DRIVES.is_dir():
         pytest.skip(f"recorded drives are not at {RECORDED_DRIVES}")
+    if item.get_closest_marker("qgis"):
+        from qgis_reading.project import is_installed
+
+        if not is_installed():
+            pytest.skip("python3-qgis is not installed")
 
 
 @pytest.hookimpl(wrapper=True)

@@ -1,1 +1,1 @@
-"""Maps as QGIS itself reads and draws them; skipped where the distribution's python3-qgis is not installed."""
+"""Maps as QGIS itself reads and draws them; tests of it are marked `qgis`."""

@@ -43,12 +43,17 @@ def is_installed() -> bool:
 
 def seen(project: Path, picture: Path, box_m: Box) -> SeenProject:
     """The project as QGIS opens it, and a picture of a box of its grid."""
-    words = [SYSTEM_PYTHON, str(LOOKING), str(project), str(picture), ",".join(map(str, box_m))]
-    finished = subprocess.run(words, capture_output=True, text=True, check=False, env=_environment(), timeout=LIMIT_S)
-    assert finished.returncode == 0, finished.stderr
-    said = json.loads(finished.stdout)
+    said = json.loads(ran_in_qgis(LOOKING, str(project), str(picture), ",".join(map(str, box_m))))
     assert said["read"], f"{project} is no project"
     return SeenProject(said["title"], said["crs"], said["layers"], said["errors"])
+
+
+def ran_in_qgis(script: Path, *words: str) -> str:
+    """What a script said on standard output, run by the system's Python. Raises AssertionError where it failed."""
+    command = [SYSTEM_PYTHON, str(script), *words]
+    finished = subprocess.run(command, capture_output=True, text=True, check=False, env=_environment(), timeout=LIMIT_S)
+    assert finished.returncode == 0, finished.stderr
+    return finished.stdout
 
 
 def _environment() -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""Projects and exported files in QGIS itself; skipped where the distribution's python3-qgis is not installed."""
+"""Projects and exported files in QGIS itself; tests of it are marked `qgis`."""
 
 import json
 import math
@@ -15,12 +15,11 @@ from command_runs.running import Run, trigpoint
 from exported_maps.examples import fill, newest
 from landmark_maps.examples import CRS
 from map_http.served import ServedMap, geopackage_line, served_map
-from qgis_reading.project import SYSTEM_PYTHON, SeenProject, is_installed, seen
+from qgis_reading.project import SYSTEM_PYTHON, SeenProject, seen
 
 AROUND_M = (331_800.0, 6_247_850.0, 332_300.0, 6_248_250.0)
 CENTIMETRE = 0.01
 ELLIPSE_M = 0.01  # of a polygon of 36 corners around an ellipse of half a metre
-in_qgis = pytest.mark.skipif(not is_installed(), reason="python3-qgis is not installed")
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +78,7 @@ def require_true_ellipse(project: SeenProject) -> None:
     assert ((west + east) / 2, (south + north) / 2) == pytest.approx((row.easting_m, row.northing_m), abs=CENTIMETRE)
 
 
-@in_qgis
+@pytest.mark.qgis
 def test_the_project_of_a_file_opens_whole_and_styled(of_file: SeenProject) -> None:
     assert of_file.crs == CRS
     assert of_file.title == "Landmark map, version 2"
@@ -90,7 +89,7 @@ def test_the_project_of_a_file_opens_whole_and_styled(of_file: SeenProject) -> N
     assert of_file.layers["Landmarks"]["renderer"] == "QgsCategorizedSymbolRenderer"
 
 
-@in_qgis
+@pytest.mark.qgis
 @pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:3857"])
 def test_ellipses_are_true_to_scale_in_a_file_of_another_crs(data: Path, tmp_path: Path, crs: str) -> None:
     path, project = tmp_path / "map.gpkg", tmp_path / "map.qgz"
@@ -101,33 +100,33 @@ def test_ellipses_are_true_to_scale_in_a_file_of_another_crs(data: Path, tmp_pat
     require_true_ellipse(opened)
 
 
-@in_qgis
+@pytest.mark.qgis
 def test_every_landmark_of_a_file_is_in_its_place(of_file: SeenProject) -> None:
     assert of_file.layers["Landmarks"]["features"] == len(newest())
     assert farthest_m(of_file) < CENTIMETRE
 
 
-@in_qgis
+@pytest.mark.qgis
 def test_the_project_of_a_service_opens_whole(live: SeenProject) -> None:
     assert (live.crs, live.errors) == (CRS, [])
     assert [name for name, one in live.layers.items() if not one["valid"]] == []
     assert "Landmarks (tiles)" in live.layers
 
 
-@in_qgis
+@pytest.mark.qgis
 def test_qgis_s_own_provider_reads_every_landmark_where_it_is(live: SeenProject) -> None:
     assert sorted(live.points_m("Landmarks")) == sorted(newest())
     assert farthest_m(live) < CENTIMETRE
 
 
-@in_qgis
+@pytest.mark.qgis
 @pytest.mark.parametrize("name", ["of_file", "live"])
 def test_ellipses_are_drawn_true_to_scale(name: str, request: pytest.FixtureRequest) -> None:
     project: SeenProject = request.getfixturevalue(name)
     require_true_ellipse(project)
 
 
-@in_qgis
+@pytest.mark.qgis
 @pytest.mark.parametrize("name", ["of_file", "live"])
 def test_residuals_are_arrows_from_the_label_to_the_landmark(name: str, request: pytest.FixtureRequest) -> None:
     project: SeenProject = request.getfixturevalue(name)
@@ -137,7 +136,7 @@ def test_residuals_are_arrows_from_the_label_to_the_landmark(name: str, request:
     assert "a3:tile-1" not in project.layers["Anchors"]["drawn_m"]  # tied to nothing
 
 
-@in_qgis
+@pytest.mark.qgis
 @pytest.mark.parametrize(("name", "picture"), [("of_file", "file.png"), ("live", "live.png")])
 def test_the_picture_shows_paths_and_landmarks_in_their_colours(
     name: str, picture: str, data: Path, request: pytest.FixtureRequest
@@ -149,7 +148,7 @@ def test_the_picture_shows_paths_and_landmarks_in_their_colours(
     assert len(colours - {(255, 255, 255)}) > 10
 
 
-@in_qgis
+@pytest.mark.qgis
 def test_gdal_s_validator_finds_nothing(geopackage: Path) -> None:
     words = [SYSTEM_PYTHON, "-m", "osgeo_utils.samples.validate_gpkg", "--extra", "--warning-as-error", str(geopackage)]
     finished = subprocess.run(words, capture_output=True, text=True, check=False)
