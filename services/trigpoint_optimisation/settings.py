@@ -141,6 +141,15 @@ class DetectionSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class MatchedSettings:
+    """How motions found by matching points, lidar odometry, enter the graph beside wheels and IMU."""
+
+    used: bool = True
+    inflation: float = 1.0  # of their covariance
+    kernel: Kernel = Kernel("dcs", 2.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class AnchorSettings:
     """How labels find their landmarks and when they are disbelieved."""
 
@@ -179,6 +188,7 @@ class SolveSettings:
     calibration: CalibrationPriors = field(default_factory=CalibrationPriors)
     odometry: OdometrySettings = field(default_factory=OdometrySettings)
     detections: DetectionSettings = field(default_factory=DetectionSettings)
+    matched: MatchedSettings = field(default_factory=MatchedSettings)
     anchors: AnchorSettings = field(default_factory=AnchorSettings)
     live: LiveSettings = field(default_factory=LiveSettings)
 
