@@ -137,6 +137,7 @@ class DetectionSettings:
     camera_range: float = 0.005  # ln range
     camera_inverse_range_per_m: float = 0.0014  # of 1 / range: a constant error in the image
     camera_bearing_rad: float = 0.007
+    shared_share: float = 0.5  # of a perceived landmark's variance is one error in all sweeps of a pass
     single_kernel: Kernel = Kernel("cauchy", 2.0)  # of sightings that enter the graph one by one
 
 

@@ -94,9 +94,9 @@ def add_relative_poses(graph: gtsam.NonlinearFactorGraph, relative: RelativePose
     """Every relative pose as a factor between its two keyframes; those within one keyframe say nothing of the graph."""
     start, end = (relative.from_drive, relative.from_keyframe), (relative.to_drive, relative.to_keyframe)
     for row in np.nonzero((start[0] != end[0]) | (start[1] != end[1]))[0]:
-        keys = (pose_key(int(drive[row]), int(keyframe[row])) for drive, keyframe in (start, end))
+        key_from, key_to = (pose_key(int(drive[row]), int(keyframe[row])) for drive, keyframe in (start, end))
         noise = with_kernel(gtsam.noiseModel.Gaussian.Covariance(relative.covariance[row]), kernel)
-        graph.add(gtsam.BetweenFactorPose2(*keys, gtsam.Pose2(*relative.T_from_to[row]), noise))
+        graph.add(gtsam.BetweenFactorPose2(key_from, key_to, gtsam.Pose2(*relative.T_from_to[row]), noise))
 
 
 def between_keyframes(prepared: PreparedDrive, motions: MotionSeries) -> MotionSeries:

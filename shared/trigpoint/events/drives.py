@@ -31,6 +31,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+CAMERA = "camera"  # VehicleDescribed.landmark_sensor_model
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WheelSeries:
