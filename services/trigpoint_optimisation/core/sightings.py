@@ -9,15 +9,19 @@ from numpy.typing import NDArray
 from trigpoint.geodesy.poses import transform_points
 from trigpoint_optimisation.core.detection_noise import DetectionNoise
 from trigpoint_optimisation.core.preparation import PreparedDrive, detected_points
+from trigpoint_optimisation.core.state import RANGE_OFFSETS
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+CORNER = "corner"  # kind of a detection
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sightings:
     """Sightings (s,): drive, keyframe, track; point_m (s, 2) in the keyframe's base frame; covariance (s, 2, 2) of what
-    is a sighting's own error; shared_m2 (s,): variance per axis of the error that all of a track's have in common."""
+    is a sighting's own error; shared_m2 (s,): variance per axis of the error that all of a track's have in common;
+    by_offset (s, 2, 2): how the point moves by the drive's range offsets, see `DriveState`."""
 
     drive: Ints
     keyframe: Ints
@@ -25,6 +29,7 @@ class Sightings:
     point_m: Floats
     covariance: Floats
     shared_m2: Floats
+    by_offset: Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,6 +73,15 @@ def perceived_covariances(prepared: PreparedDrive) -> Floats:
     return turned
 
 
+def _by_offset(prepared: PreparedDrive) -> Floats:
+    """How detected points move in their keyframes' frames by the drive's range offsets (d, 2, 2): along their rays."""
+    detections, described = prepared.drive.detections, prepared.drive.described
+    angle = detections.bearing_rad + described.landmark_sensor_yaw_rad + prepared.detection_offset[:, 2]
+    corner = np.array([kind == CORNER for kind in detections.kind], dtype=bool)
+    of_kind = np.column_stack([~corner, corner])
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)[:, :, None] * of_kind[:, None, :]
+
+
 def drive_sightings(prepared: PreparedDrive, track: Ints, averaging: Averaging) -> Sightings:
     """One sighting for each track and keyframe of a drive; `track` (d,) by detection, negative where none.
 
@@ -84,6 +98,8 @@ def drive_sightings(prepared: PreparedDrive, track: Ints, averaging: Averaging) 
     point, covariance = np.zeros((len(unique), 2)), np.zeros((len(unique), 2, 2))
     np.add.at(point, group, keyframe_points(prepared, point_scale=averaging.point_scale)[rows])
     np.add.at(covariance, group, variances)
+    by_offset = np.zeros((len(unique), 2, RANGE_OFFSETS))
+    np.add.at(by_offset, group, _by_offset(prepared)[rows])
     mean = covariance / count[:, None, None]
     by_perception = np.bincount(group, weights=told, minlength=len(unique)) > 0
     shared_m2 = np.where(by_perception, averaging.shared_share * 0.5 * np.trace(mean, axis1=1, axis2=2), 0.0)
@@ -96,6 +112,7 @@ def drive_sightings(prepared: PreparedDrive, track: Ints, averaging: Averaging) 
         point_m=point / count[:, None],
         covariance=mean / divided[:, None, None] + common_m2[:, None, None] * np.eye(2),
         shared_m2=shared_m2,
+        by_offset=by_offset / count[:, None, None],
     )
 
 
@@ -108,4 +125,5 @@ def joined(parts: Sequence[Sightings]) -> Sightings:
         point_m=np.concatenate([part.point_m for part in parts]),
         covariance=np.concatenate([part.covariance for part in parts]),
         shared_m2=np.concatenate([part.shared_m2 for part in parts]),
+        by_offset=np.concatenate([part.by_offset for part in parts]),
     )
