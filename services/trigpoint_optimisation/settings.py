@@ -79,6 +79,7 @@ class CalibrationPriors:
     turn_bias_sampled_radpm: float = 0.03  # 1.7 % between the radii of wheels 0.57 m apart
     delay_sampled_s: float = 0.30  # a sample a second says when to within its period / sqrt(12)
     delay_camera_s: float = 0.30  # images are worked on before they are stamped
+    range_offset_m: float = 0.03  # a point lies on a thing's near side, its axis beyond
     camera_range: float = 0.02  # ln range, averaged over the drive's own bearings
     camera_range_per_rad: float = 0.05
     camera_range_per_rad2: float = 0.5  # a camera sees depth: ln cos(bearing) is -bearing^2 / 2
@@ -137,7 +138,17 @@ class DetectionSettings:
     camera_range: float = 0.005  # ln range
     camera_inverse_range_per_m: float = 0.0014  # of 1 / range: a constant error in the image
     camera_bearing_rad: float = 0.007
+    shared_share: float = 0.5  # of a perceived landmark's variance is one error in all sweeps of a pass
     single_kernel: Kernel = Kernel("cauchy", 2.0)  # of sightings that enter the graph one by one
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MatchedSettings:
+    """How motions found by matching points, lidar odometry, enter the graph beside wheels and IMU."""
+
+    used: bool = True
+    inflation: float = 1.0  # of their covariance
+    kernel: Kernel = Kernel("dcs", 2.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -179,6 +190,7 @@ class SolveSettings:
     calibration: CalibrationPriors = field(default_factory=CalibrationPriors)
     odometry: OdometrySettings = field(default_factory=OdometrySettings)
     detections: DetectionSettings = field(default_factory=DetectionSettings)
+    matched: MatchedSettings = field(default_factory=MatchedSettings)
     anchors: AnchorSettings = field(default_factory=AnchorSettings)
     live: LiveSettings = field(default_factory=LiveSettings)
 

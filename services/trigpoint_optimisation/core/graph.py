@@ -14,6 +14,7 @@ from trigpoint_optimisation.core.factors import (
     decay_factor,
     fix_factor,
     odometry_factor,
+    point_factor,
     sighting_factor,
 )
 from trigpoint_optimisation.core.odometry import OdometryCalibration, TurnSource
@@ -21,13 +22,16 @@ from trigpoint_optimisation.core.preparation import PreparedDrive
 from trigpoint_optimisation.core.sightings import Sightings
 from trigpoint_optimisation.core.single_sightings import SingleSightings
 from trigpoint_optimisation.core.state import (
+    RANGE_OFFSETS,
     antenna_key,
     fix_bias_key,
     image_key,
     landmark_key,
     pose_key,
+    range_offset_key,
     scale_key,
     sensor_key,
+    track_key,
     turn_bias_key,
 )
 from trigpoint_optimisation.settings import CalibrationPriors, FixSettings, Kernel
@@ -137,6 +141,8 @@ def add_calibration_priors(
     graph.add(gtsam.PriorFactorVector(scale_key(d), np.array([point_scale, 1.0, 0.0]), diagonal(sigmas)))
     graph.add(gtsam.PriorFactorVector(antenna_key(d), arm_m, diagonal(np.full(2, priors.antenna_m))))
     graph.add(gtsam.PriorFactorVector(sensor_key(d), np.zeros(6), diagonal(sensor_sigmas(prepared, priors))))
+    offset = gtsam.noiseModel.Isotropic.Sigma(RANGE_OFFSETS, priors.range_offset_m)
+    graph.add(gtsam.PriorFactorVector(range_offset_key(d), np.zeros(RANGE_OFFSETS), offset))
     graph.add(gtsam.PriorFactorVector(turn_bias_key(d, 0), np.zeros(1), diagonal(np.array([turn_bias]))))
     by_imu = prepared.source is TurnSource.IMU
     fraction = priors.turn_bias_walk_fraction_imu if by_imu else priors.turn_bias_walk_fraction
@@ -196,7 +202,11 @@ def add_fixes(
 def add_sightings(
     graph: gtsam.NonlinearFactorGraph, sightings: Sightings, landmark: Ints, *, kernel: Kernel | None
 ) -> None:
-    """Bearing and range from keyframe to landmark; `landmark` (s,) by sighting, negative ones left out."""
+    """Bearing and range from keyframe to landmark; `landmark` (s,) by sighting, negative ones left out.
+
+    Those of perceived landmarks are of their track's own point, which is off the landmark by the error they share, and
+    as far off in range as their drive's offset says.
+    """
     x, y = sightings.point_m.T
     range_m = np.hypot(x, y)
     rows = np.nonzero((landmark >= 0) & (range_m > MIN_RANGE_M))[0]
@@ -204,9 +214,29 @@ def add_sightings(
     covariance = to_polar @ sightings.covariance @ to_polar.transpose(0, 2, 1)
     bearing = np.arctan2(y, x)
     for row in rows:
+        d, pose = int(sightings.drive[row]), pose_key(int(sightings.drive[row]), int(sightings.keyframe[row]))
+        if sightings.shared_m2[row] > 0.0:
+            noise = with_kernel(gtsam.noiseModel.Gaussian.Covariance(sightings.covariance[row]), kernel)
+            keys = pose, range_offset_key(d), track_key(int(sightings.track[row]))
+            graph.add(point_factor(keys, sightings.point_m[row], by_offset=sightings.by_offset[row], noise=noise))
+            continue
         noise = with_kernel(gtsam.noiseModel.Gaussian.Covariance(covariance[row]), kernel)
-        keys = pose_key(int(sightings.drive[row]), int(sightings.keyframe[row])), landmark_key(int(landmark[row]))
-        graph.add(gtsam.BearingRangeFactor2D(*keys, gtsam.Rot2(bearing[row]), range_m[row], noise))
+        seen = landmark_key(int(landmark[row]))
+        graph.add(gtsam.BearingRangeFactor2D(pose, seen, gtsam.Rot2(bearing[row]), range_m[row], noise))
+    _add_shared_errors(graph, sightings, landmark, kernel=kernel)
+
+
+def _add_shared_errors(
+    graph: gtsam.NonlinearFactorGraph, sightings: Sightings, landmark: Ints, *, kernel: Kernel | None
+) -> None:
+    """Each track's own point at its landmark, as surely as the error that the track's sightings share is small."""
+    rows = np.nonzero((landmark >= 0) & (sightings.shared_m2 > 0.0))[0]
+    tracks, first, number = np.unique(sightings.track[rows], return_index=True, return_inverse=True)
+    variance_m2 = np.bincount(number, weights=sightings.shared_m2[rows]) / np.maximum(np.bincount(number), 1)
+    for track, row, variance in zip(tracks, rows[first], variance_m2, strict=True):
+        noise = with_kernel(gtsam.noiseModel.Isotropic.Variance(2, variance), kernel)
+        keys = landmark_key(int(landmark[row])), track_key(int(track))
+        graph.add(gtsam.BetweenFactorPoint2(*keys, np.zeros(2), noise))
 
 
 def add_single_sightings(
