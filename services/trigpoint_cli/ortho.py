@@ -91,7 +91,13 @@ def _grid_values(grid: RenderedGrid) -> JsonObject:
 
 @command.command("register")
 @click.option("--ortho", required=True, metavar="FILE", type=FILE, help="ortho.tif of `trigpoint ortho render`.")
-@click.option("--image", required=True, metavar="FILE", type=FILE, help="A georeferenced aerial image.")
+@click.option(
+    "--image",
+    required=True,
+    metavar="PATH",
+    type=click.Path(path_type=Path),
+    help="A georeferenced aerial image, or a folder of web tiles {z}/{x}/{y}.",
+)
 @answering
 def register(ortho: Path, image: Path, *, screen: Screen) -> Answer:
     """Measure where an aerial image shows the ground, less where the ortho layer has it, tile by tile."""

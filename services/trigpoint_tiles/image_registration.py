@@ -19,7 +19,6 @@ TILE_M = 50.0  # a tile's side: large enough for edges in every direction, small
 PIXEL_LEAST_M, PIXEL_MOST_M = 0.1, 0.5  # finer tells nothing more, coarser hides kerbs and markings
 MEAN_FROM = 1.5  # pixels in one a side, from which their mean is taken
 COVERED_LEAST = 0.1  # of a tile, by both
-COLOURS = 3  # an image's first bands; what follows is alpha or infrared
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,10 +55,9 @@ def register_image(ortho: Path, image: Path) -> ImageRegistration:
         reflectivity, height = _band(layer, BANDS[REFLECTIVITY].name), _band(layer, BANDS[HEIGHT_ABOVE_M].name)
         whole = layer.place
         pixel_m = whole.pixel_m * _pixels_in_one(whole.pixel_m, picture.ground_pixel_m(whole))
-        bands = tuple(range(1, min(picture.band_count, COLOURS) + 1))
         tiles = []
         for place in _places(whole.within(picture.bounds_on(whole)), pixel_m):
-            shown = picture.read_on(place, bands, mean=pixel_m > MEAN_FROM * picture.ground_pixel_m(whole))
+            shown = picture.read_on(place, picture.colours, mean=pixel_m > MEAN_FROM * picture.ground_pixel_m(whole))
             seen = layer.read_on(place, (reflectivity, height), mean=pixel_m > MEAN_FROM * whole.pixel_m)
             if min(np.isfinite(seen[0]).mean(), np.isfinite(shown[0]).mean()) >= COVERED_LEAST:
                 tiles.append(_registered(place, seen, shown))
