@@ -31,6 +31,9 @@ def command() -> None:
 @click.option(
     "--resolution-m", type=click.FloatRange(0.01, 100.0), default=DEFAULTS.resolution_m, show_default=True, metavar="M"
 )
+@click.option(
+    "--deskew/--no-deskew", default=DEFAULTS.deskew, show_default=True, help="Place points by the pose at their time."
+)
 @click.option("--attribution", default=DEFAULTS.attribution, metavar="TEXT", help="Whom the data is from.")
 @answering
 def render(data: DataDirectory, out: Path, *, crs: str | None, formats: str, screen: Screen, **asked: Any) -> Answer:
