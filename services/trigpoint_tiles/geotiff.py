@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +26,7 @@ Floats = NDArray[np.float64]
 
 MARGIN_PX = 4  # more than a cubic looks at
 COLOURS_MOST = 3  # what follows is infrared, if not alpha
+MAP_VERSION = "MAP_VERSION"  # of a layer's metadata
 CACHE_BYTES = 64 * 1024**2  # of GDAL's blocks
 WORKING = {"driver": "GTiff", "dtype": "float32", "tiled": True, "compress": "zstd", "zstd_level": 1}
 OPTIMISED = {"compress": "DEFLATE", "predictor": "YES", "blocksize": 512, "bigtiff": "IF_SAFER"}
@@ -101,6 +102,18 @@ class RasterPlace:
             rows=max(min(bottom, self.rows) - top, 0),
         )
 
+    def grown(self, margin_m: float) -> tuple["RasterPlace", int]:
+        """With at least so many metres more to every side, and how many pixels that is."""
+        margin = math.ceil(margin_m / self.pixel_m)
+        grown = replace(
+            self,
+            left_m=self.left_m - margin * self.pixel_m,
+            top_m=self.top_m + margin * self.pixel_m,
+            columns=self.columns + 2 * margin,
+            rows=self.rows + 2 * margin,
+        )
+        return grown, margin
+
     @property
     def bounds_m(self) -> tuple[float, float, float, float]:
         """West, south, east and north in grid metres."""
@@ -164,6 +177,11 @@ class RasterFile:
             columns=raster.width,
             rows=raster.height,
         )
+
+    @property
+    def crs(self) -> str:
+        """Its CRS by authority and code where it has one, else as WKT."""
+        return str(self._raster.crs.to_string())
 
     @property
     def colours(self) -> tuple[int, ...]:

@@ -17,7 +17,8 @@ class TilesSettings:
     Pixels are `resolution_m` of ground a side (of web tiles: the first zoom as fine). Points nearer to their sensor
     than `range_least_m` or farther than `range_most_m` are left out. What is gathered and not yet on disk takes at most
     `memory_bytes`. With `deskew` each point is placed by the pose at its own time, without it by that at its sweep's
-    stamp, as if the vehicle had stood still meanwhile. Overviews for the web begin `zooms` below the finest zoom. `attribution` goes into every file.
+    stamp, as if the vehicle had stood still meanwhile. Overviews for the web begin `zooms` below the finest zoom.
+    `attribution` goes into every file.
     """
 
     resolution_m: Annotated[float, Field(ge=0.01, le=100.0)] = 0.1
