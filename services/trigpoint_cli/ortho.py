@@ -31,6 +31,9 @@ def command() -> None:
 @click.option(
     "--resolution-m", type=click.FloatRange(0.01, 100.0), default=DEFAULTS.resolution_m, show_default=True, metavar="M"
 )
+@click.option(
+    "--deskew/--no-deskew", default=DEFAULTS.deskew, show_default=True, help="Place points by the pose at their time."
+)
 @click.option("--attribution", default=DEFAULTS.attribution, metavar="TEXT", help="Whom the data is from.")
 @answering
 def render(data: DataDirectory, out: Path, *, crs: str | None, formats: str, screen: Screen, **asked: Any) -> Answer:
@@ -91,7 +94,13 @@ def _grid_values(grid: RenderedGrid) -> JsonObject:
 
 @command.command("register")
 @click.option("--ortho", required=True, metavar="FILE", type=FILE, help="ortho.tif of `trigpoint ortho render`.")
-@click.option("--image", required=True, metavar="FILE", type=FILE, help="A georeferenced aerial image.")
+@click.option(
+    "--image",
+    required=True,
+    metavar="PATH",
+    type=click.Path(path_type=Path),
+    help="A georeferenced aerial image, or a folder of web tiles {z}/{x}/{y}.",
+)
 @answering
 def register(ortho: Path, image: Path, *, screen: Screen) -> Answer:
     """Measure where an aerial image shows the ground, less where the ortho layer has it, tile by tile."""

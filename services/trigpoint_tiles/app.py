@@ -118,6 +118,7 @@ def _tags(
         "MAP_CRS": frame.crs,
         "MAP_OPERATION": frame.operation,
         "COORDINATE_EPOCH": f"{epoch.year + (newest_ns / 1e9 - begin_s) / YEAR_S:.3f}",
+        "DESKEWED": "YES" if settings.deskew else "NO",
         "ATTRIBUTION": settings.attribution,
         "TIFFTAG_SOFTWARE": "trigpoint",
     }

@@ -51,7 +51,7 @@ class DriveGatherer:
     def __init__(self, log: RecallingLog, frame: MapFrame, grid: RasterGrid, settings: TilesSettings) -> None:
         self._log, self._grid, self._settings = log, grid, settings
         self._limits = RangeLimits(least_m=settings.range_least_m, most_m=settings.range_most_m)
-        self._placer = SweepPlacer(frame, grid, reach_m=settings.range_most_m)
+        self._placer = SweepPlacer(frame, grid, reach_m=settings.range_most_m, deskew=settings.deskew)
 
     def gathered(self, clouds: DriveClouds, parts: DriveParts, *, progress: SweepDone) -> GatheredDrive:
         """The drive's parts brought up to its path. Raises InputError where memory is too little or a part damaged."""

@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import rasterio
 import rasterio.shutil
 from numpy.typing import NDArray
-from rasterio.enums import Resampling
+from rasterio.enums import ColorInterp, Resampling
 from rasterio.errors import RasterioError
 from rasterio.transform import Affine, from_origin
 from rasterio.warp import calculate_default_transform, reproject, transform_bounds
@@ -18,11 +18,15 @@ from rasterio.windows import Window
 from trigpoint.durable_files import replaced_durably
 from trigpoint.errors import InputError
 from trigpoint_tiles.core.grid import TILE_PX, RasterGrid, Tile, TileBox
+from trigpoint_tiles.core.mosaics import finest, mosaic_vrt
 from trigpoint_tiles.core.rendering import BANDS, Bands
+from trigpoint_tiles.picture_files import tile_file, xyz_tiles
 
 Floats = NDArray[np.float64]
 
 MARGIN_PX = 4  # more than a cubic looks at
+COLOURS_MOST = 3  # what follows is infrared, if not alpha
+MAP_VERSION = "MAP_VERSION"  # of a layer's metadata
 CACHE_BYTES = 64 * 1024**2  # of GDAL's blocks
 WORKING = {"driver": "GTiff", "dtype": "float32", "tiled": True, "compress": "zstd", "zstd_level": 1}
 OPTIMISED = {"compress": "DEFLATE", "predictor": "YES", "blocksize": 512, "bigtiff": "IF_SAFER"}
@@ -65,6 +69,14 @@ def _write_working(
             raster.write(bands, window=Window(column, row, TILE_PX, TILE_PX))
 
 
+def _tiles_as_one(folder: Path) -> str:
+    """The finest tiles of a folder as a mosaic in GDAL's own words. Raises InputError."""
+    paths = dict(xyz_tiles(folder))
+    if not paths:
+        raise InputError(f"{folder}: no tiles here: a folder of web tiles has {{z}}/{{x}}/{{y}}.png, .jpg or .webp")
+    return mosaic_vrt({tile: tile_file(paths[tile]) for tile in finest(paths)})
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RasterPlace:
     """Where a raster lies: CRS, the corner in the north-west, pixel side in grid metres, columns and rows."""
@@ -90,6 +102,18 @@ class RasterPlace:
             rows=max(min(bottom, self.rows) - top, 0),
         )
 
+    def grown(self, margin_m: float) -> tuple["RasterPlace", int]:
+        """With at least so many metres more to every side, and how many pixels that is."""
+        margin = math.ceil(margin_m / self.pixel_m)
+        grown = replace(
+            self,
+            left_m=self.left_m - margin * self.pixel_m,
+            top_m=self.top_m + margin * self.pixel_m,
+            columns=self.columns + 2 * margin,
+            rows=self.rows + 2 * margin,
+        )
+        return grown, margin
+
     @property
     def bounds_m(self) -> tuple[float, float, float, float]:
         """West, south, east and north in grid metres."""
@@ -103,13 +127,17 @@ class RasterPlace:
 
 
 class RasterFile:
-    """A georeferenced raster file, read a part at a time on pixels of one's choice."""
+    """A georeferenced raster file, or a folder of web tiles, read a part at a time on pixels of one's choice."""
 
     def __init__(self, path: Path) -> None:
-        """Raises InputError for a file GDAL cannot read, or one that does not say where it lies."""
+        """A folder holds WebMercatorQuad tiles `{z}/{x}/{y}.<ending>`; those of its finest zoom are read.
+
+        Raises InputError for a file GDAL cannot read, or one that does not say where it lies, and for a folder without
+        such tiles.
+        """
         self.path = path
         try:
-            self._raster = rasterio.open(path)
+            self._raster = rasterio.open(_tiles_as_one(path) if path.is_dir() else path)
         except RasterioError as error:
             raise InputError(f"{path}: no raster can be read here: {error}") from error
         if self._raster.crs is None or self._raster.transform.is_identity:
@@ -151,9 +179,20 @@ class RasterFile:
         )
 
     @property
-    def band_count(self) -> int:
-        """How many bands it has."""
-        return int(self._raster.count)
+    def crs(self) -> str:
+        """Its CRS by authority and code where it has one, else as WKT."""
+        return str(self._raster.crs.to_string())
+
+    @property
+    def colours(self) -> tuple[int, ...]:
+        """The numbers of its first bands that show something, from 1, three at most."""
+        seen = [number for number in self._raster.indexes if self._raster.colorinterp[number - 1] != ColorInterp.alpha]
+        return tuple(seen[:COLOURS_MOST])
+
+    def tag(self, name: str) -> str | None:
+        """What the file's metadata say under a name, None where they say nothing."""
+        found = self._raster.tags().get(name)
+        return None if found is None else str(found)
 
     def bounds_on(self, place: RasterPlace) -> tuple[float, float, float, float]:
         """West, south, east and north in the metres of another raster's grid. Raises InputError as `read_on` does."""

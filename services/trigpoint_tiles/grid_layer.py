@@ -127,7 +127,7 @@ class GridLayer:
     def _identity(self) -> str:
         """What the parts depend on besides sweeps and paths."""
         chosen = self._settings
-        made_of = (FORM, repr(self._grid), repr(self._frame), chosen.range_least_m, chosen.range_most_m)
+        made_of = (FORM, repr(self._grid), repr(self._frame), chosen.range_least_m, chosen.range_most_m, chosen.deskew)
         return blake2b(repr(made_of).encode(), digest_size=16).hexdigest()
 
     def _state(self) -> Mapping[str, Any] | None:

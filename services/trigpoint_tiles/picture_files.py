@@ -10,10 +10,14 @@ from pmtiles.tile import Compression, TileType, zxy_to_tileid
 from pmtiles.writer import write
 
 from trigpoint.durable_files import replaced_durably
+from trigpoint.errors import InputError
 from trigpoint.geodesy.web_tiles import WebTile, tile_edges_deg
+from trigpoint_tiles.core.mosaics import TileFile
 from trigpoint_tiles.core.pictures import Picture, from_farther
 
 PNG_LEVEL = 6
+ENDINGS = (".png", ".jpg", ".jpeg", ".webp")
+COLOURS = {"L": (1, False), "LA": (1, True), "RGB": (3, False), "RGBA": (3, True)}  # how many, and alpha, by mode
 E7 = 1e7
 Bounds = tuple[float, float, float, float]
 
@@ -66,8 +70,30 @@ class PictureFolder:
 
     def tiles(self) -> Iterator[WebTile]:
         """Every tile there is."""
-        for path in self.folder.glob("*/*/*.png"):
-            yield WebTile(int(path.parent.parent.name), int(path.parent.name), int(path.stem))
+        return (tile for tile, path in xyz_tiles(self.folder) if path.suffix == ".png")
+
+
+def xyz_tiles(folder: Path) -> Iterator[tuple[WebTile, Path]]:
+    """Every picture `{z}/{x}/{y}.<ending>` in a folder, anybody's: what is not named like a tile is passed over."""
+    for path in folder.glob("*/*/*.*"):
+        names = (path.parent.parent.name, path.parent.name, path.stem)
+        if path.suffix in ENDINGS and all(name.isdecimal() for name in names):
+            zoom, column, row = map(int, names)
+            yield WebTile(zoom, column, row), path
+
+
+def tile_file(path: Path) -> TileFile:
+    """What a tile's file is like. Raises InputError for one that is no picture, not square, or not of grey or colours
+    of 8 bits."""
+    try:
+        with Image.open(path) as image:
+            size, mode = image.size, image.mode
+    except OSError as error:
+        raise InputError(f"{path}: no picture can be read here: {error}") from error
+    if size[0] != size[1] or mode not in COLOURS:
+        raise InputError(f"{path}: {size[0]} x {size[1]} pixels of mode {mode}: square ones of {', '.join(COLOURS)}")
+    colours, alpha = COLOURS[mode]
+    return TileFile(path=str(path.resolve()), side_px=size[0], colours=colours, alpha=alpha)
 
 
 def bounds_deg(tiles: Iterable[WebTile]) -> Bounds:

@@ -86,18 +86,22 @@ def sweep_span_ns(sweep: PointsScanned, stamp_ns: int) -> tuple[int, int]:
     return stamp_ns + int(sweep.offset_ns.min(initial=0)), stamp_ns + int(sweep.offset_ns.max(initial=0))
 
 
-def sweep_table(sweep: PointsScanned, stamp_ns: int, path: DrivenPath, plane: PixelAffine) -> SweepTable:
-    """The table of a sweep whose time the path holds, onto a plane that is affine to the map."""
+def sweep_table(
+    sweep: PointsScanned, stamp_ns: int, path: DrivenPath, plane: PixelAffine, *, deskew: bool = True
+) -> SweepTable:
+    """The table of a sweep whose time the path holds, onto a plane that is affine to the map; without `deskew` as if
+    all its points were measured at its stamp."""
     first_ns, last_ns = sweep_span_ns(sweep, stamp_ns)
     steps = max(1, -(-(last_ns - first_ns) // ENTRY_NS))
     step_ns = max((last_ns - first_ns) / steps, 1.0)
     at_ns = first_ns + np.round(np.arange(steps + 1) * (last_ns - first_ns) / steps).astype(np.int64)
+    pose = path.poses_at(at_ns if deskew else np.full_like(at_ns, stamp_ns))
     T_base_sensor = np.column_stack([_rotation(sweep.sensor_orientation), sweep.sensor_position_m])
     covariance = path.covariance_at(stamp_ns)
     return SweepTable(
         first_ns=first_ns - stamp_ns,
         step_ns=step_ns,
-        to_plane=_to_plane(path.poses_at(at_ns), T_base_sensor, plane),
+        to_plane=_to_plane(pose, T_base_sensor, plane),
         to_height=T_base_sensor[2].copy(),
         variance=np.array([0.5 * (covariance[0, 0] + covariance[1, 1]) + RANGE_SIGMA_M**2, covariance[2, 2]]),
     )
@@ -106,9 +110,10 @@ def sweep_table(sweep: PointsScanned, stamp_ns: int, path: DrivenPath, plane: Pi
 class SweepPlacer:
     """Places sweeps on a grid; the affine of each square of ground is worked out once."""
 
-    def __init__(self, frame: MapFrame, grid: RasterGrid, *, reach_m: float) -> None:
-        """No point counts that is farther than `reach_m` from its sensor."""
-        self._frame, self._grid = frame, grid
+    def __init__(self, frame: MapFrame, grid: RasterGrid, *, reach_m: float, deskew: bool = True) -> None:
+        """No point counts that is farther than `reach_m` from its sensor; without `deskew` all of a sweep's are placed
+        by the pose at its stamp."""
+        self._frame, self._grid, self._deskew = frame, grid, deskew
         self._reach_m = reach_m + LEVER_MOST_M
         self._affines: dict[tuple[int, int], PixelAffine] = {}
 
@@ -116,7 +121,7 @@ class SweepPlacer:
         """A sweep whose time the path holds, and the tiles within its reach."""
         base_m = path.poses_at(np.array([stamp_ns], dtype=np.int64))[0, :2]
         affine = self._affine(base_m)
-        table = sweep_table(sweep, stamp_ns, path, affine)
+        table = sweep_table(sweep, stamp_ns, path, affine, deskew=self._deskew)
         box = box_of_cells(*self.reached_cells(base_m))
         bend_px = STRAIGHT if affine.error_px <= AFFINE_ERROR_PX else self._bend_px(sweep, stamp_ns, path, affine)
         return PlacedSweep(table=table, bend_px=bend_px), box
@@ -143,7 +148,7 @@ class SweepPlacer:
 
     def _bend_px(self, sweep: PointsScanned, stamp_ns: int, path: DrivenPath, affine: PixelAffine) -> Floats:
         """How far (n, 2) the exact projection of each point lies from the affine one."""
-        pose = path.poses_at(stamp_ns + sweep.offset_ns.astype(np.int64))
+        pose = path.poses_at(stamp_ns + sweep.offset_ns.astype(np.int64) * self._deskew)
         T_base_sensor = np.column_stack([_rotation(sweep.sensor_orientation), sweep.sensor_position_m])
         near = np.nan_to_num(sweep.point_m.astype(np.float64), posinf=0.0, neginf=0.0)
         far = np.linalg.norm(near, axis=1) > self._reach_m

@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 SMOOTHING_PX = 1.0  # 1-sigma; finer edges are noise, coarser ones shadows and crowns of trees
-REACH_M = 3.0  # an image that is farther off is found by its labels first
+REACH_M = 3.0  # searched unless more is asked for
 BLOCK_M = 6.0  # what is in one block counts as one observation: about an object's size
 HEIGHTS_M = (1.0, 2.5, 4.0, 6.0, 9.0, 14.0)  # between heights that are taken as one
 LEAN_SIGMA = 0.1  # metres a metre of height; aerial cameras see 0 to 0.3, mosaics use the middle of their images
@@ -29,7 +29,7 @@ LEAN_LIMIT = 0.4
 RIVAL_PX = 4.0  # a maximum nearer than this belongs to the highest one
 CONFIDENCE_LEAST = 0.95
 BLOCKS_LEAST = 8
-TILE_PX_LEAST = 48
+TILE_PX_LEAST = 24  # that stay inside the image at every shift
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,15 +55,21 @@ class Registration:
 
 
 def registered(
-    layers: Sequence[Floats], height_above_m: Floats, image: Sequence[Floats], *, pixel_m: float
+    layers: Sequence[Floats],
+    height_above_m: Floats,
+    image: Sequence[Floats],
+    *,
+    pixel_m: float,
+    reach_m: float = REACH_M,
 ) -> Registration:
     """An image's bands (h, w) on an ortho layer's (h, w), north up on the same pixels, NaN where nothing is known.
 
-    height_above_m (h, w): height above ground, NaN counts as ground. Raises InputError for a tile too small to shift.
+    height_above_m (h, w): height above ground, NaN counts as ground. Shifts of up to `reach_m` either way are searched,
+    for what is farther than that from the edge. Raises InputError for a tile too small to shift.
     """
     shape = height_above_m.shape
-    reach_px = round(REACH_M / pixel_m)
-    least = side_least_px(pixel_m)
+    reach_px = round(reach_m / pixel_m)
+    least = TILE_PX_LEAST + 2 * reach_px
     if min(shape) < least:
         raise InputError(f"a tile of {shape[1]} x {shape[0]} pixels is too small to register: at least {least} a side")
     fixed = edge_directions(layers, sigma_px=SMOOTHING_PX)
@@ -79,11 +85,6 @@ def registered(
     if len(surfaces) < BLOCKS_LEAST:
         return unknown(f"{len(surfaces)} blocks of {BLOCK_M:g} m show edges in both: at least {BLOCKS_LEAST}")
     return _Fit(surfaces, height_m, pixel_m).registration()
-
-
-def side_least_px(pixel_m: float) -> int:
-    """How many pixels a tile needs a side for its middle half to stay inside the image at every shift."""
-    return max(TILE_PX_LEAST, 4 * round(REACH_M / pixel_m))
 
 
 def unknown(reason: str) -> Registration:
@@ -136,7 +137,8 @@ class _Fit:
         total = self._surfaces.sum(axis=(0, 1))
         start = np.array(np.unravel_index(total.argmax(), total.shape), dtype=np.float64) - self._reach
         if np.abs(start).max() >= self._reach - 1:
-            return unknown(f"the best agreement is at the edge of the {REACH_M:g} m that are searched")
+            edge_m = self._reach * self._pixel_m
+            return unknown(f"the best agreement is at the edge of the {edge_m:g} m that are searched")
         weight = self._likelihood_weight(np.array([*start, 0.0, 0.0]))
         best = self._optimum(start, weight)
         covariance_px2 = self._covariance(best, weight)
