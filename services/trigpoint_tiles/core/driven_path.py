@@ -1,12 +1,13 @@
 """A drive's solved path at any time between its poses."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trigpoint.compiled import compiled
 from trigpoint.events.mapped import TrajectorySolved
-from trigpoint.geodesy.poses import transform_points, wrap_angles_rad
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -34,14 +35,9 @@ class DrivenPath:
     def poses_at(self, stamp_ns: Ints) -> Floats:
         """Poses (m, 3) at times (m,) the path holds: on the arc of constant speed and turn from pose to pose (the
         exponential map of SE(2))."""
-        before = np.clip(np.searchsorted(self.stamp_ns, stamp_ns, side="right") - 1, 0, len(self.stamp_ns) - 2)
-        start, end = self.pose[before], self.pose[before + 1]
-        span_ns = self.stamp_ns[before + 1] - self.stamp_ns[before]
-        share = (stamp_ns - self.stamp_ns[before]) / span_ns
-        turn_rad = wrap_angles_rad(end[:, 2] - start[:, 2])
-        chord_m = end[:, :2] - start[:, :2]
-        part_m = _arc_share(share, turn_rad)[:, None] * _rotated(chord_m, -0.5 * (1.0 - share) * turn_rad)
-        return np.column_stack([start[:, :2] + part_m, start[:, 2] + share * turn_rad])
+        found = np.empty((len(stamp_ns), 3))
+        _on_arcs(self.stamp_ns, self.pose, np.searchsorted(self.stamp_ns, stamp_ns, side="right"), stamp_ns, found)
+        return found
 
     def covariance_at(self, stamp_ns: int) -> Floats:
         """The covariance (3, 3) of the pose nearest in time."""
@@ -56,13 +52,25 @@ def path_of(solved: TrajectorySolved) -> DrivenPath:
     return DrivenPath(stamp_ns=solved.stamp_ns[first], pose=solved.pose[first], covariance=solved.covariance[first])
 
 
-def _arc_share(share: Floats, turn_rad: Floats) -> Floats:
+@compiled
+def _on_arcs(path_ns: Ints, pose: Floats, after: Ints, stamp_ns: Ints, found: Floats) -> None:
+    """Fills in poses at times, each before the pose of the path at `after`."""
+    for one in range(len(stamp_ns)):
+        begin = min(max(after[one] - 1, 0), len(path_ns) - 2)
+        end = begin + 1
+        share = (stamp_ns[one] - path_ns[begin]) / (path_ns[end] - path_ns[begin])
+        turn_rad = (pose[end, 2] - pose[begin, 2] + math.pi) % (2.0 * math.pi) - math.pi
+        x_m, y_m = pose[end, 0] - pose[begin, 0], pose[end, 1] - pose[begin, 1]
+        back_rad = -0.5 * (1.0 - share) * turn_rad
+        part, c, s = _arc_share(share, turn_rad), math.cos(back_rad), math.sin(back_rad)
+        found[one, 0] = pose[begin, 0] + part * (c * x_m - s * y_m)
+        found[one, 1] = pose[begin, 1] + part * (s * x_m + c * y_m)
+        found[one, 2] = pose[begin, 2] + share * turn_rad
+
+
+@compiled
+def _arc_share(share: float, turn_rad: float) -> float:
     """The chord of a share of an arc over the whole chord: sin(share turn/2) / sin(turn/2)."""
-    straight = np.abs(turn_rad) < STRAIGHT_RAD
-    half = np.where(straight, 1.0, 0.5 * turn_rad)
-    return np.asarray(np.where(straight, share, np.sin(share * half) / np.sin(half)))
-
-
-def _rotated(vector_m: Floats, angle_rad: Floats) -> Floats:
-    nowhere = np.zeros_like(angle_rad)
-    return transform_points(np.column_stack([nowhere, nowhere, angle_rad]), vector_m)
+    if abs(turn_rad) < STRAIGHT_RAD:
+        return share
+    return math.sin(0.5 * share * turn_rad) / math.sin(0.5 * turn_rad)

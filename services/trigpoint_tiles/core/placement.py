@@ -162,7 +162,7 @@ def _to_plane(pose: Floats, T_base_sensor: Floats, plane: PixelAffine) -> Floats
     """From sensor to plane (m, 2, 4) at poses (m, 3), with the sensor in the base (3, 4)."""
     c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
     turn = np.stack([np.stack([c, -s], axis=-1), np.stack([s, c], axis=-1)], axis=-2)
-    linear: Floats = np.einsum("ij,mjk,kl->mil", plane.matrix, turn, T_base_sensor[:2])
+    linear: Floats = plane.matrix @ turn @ T_base_sensor[:2]
     linear[:, :, 3] += pose[:, :2] @ plane.matrix.T + plane.offset
     return linear
 
