@@ -147,7 +147,7 @@ class MatchedSettings:
     """How motions found by matching points, lidar odometry, enter the graph beside wheels and IMU."""
 
     used: bool = True
-    inflation: float = 1.0  # of their covariance
+    covariance_factor: float = 0.25  # of a motion over a keyframe: its sum counts every sweep between the ends twice
     kernel: Kernel = Kernel("dcs", 2.0)
 
 
