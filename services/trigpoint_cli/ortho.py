@@ -1,15 +1,26 @@
 """`trigpoint ortho`: the lidar points of all drives as rasters, and where aerial images lie beside them."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 
+from trigpoint.durable_files import replace_durably
 from trigpoint.errors import InputError
+from trigpoint_cli.anchors import anchor_values
+from trigpoint_cli.corrections import attributed
 from trigpoint_cli.data_dir import DataDirectory, data_option
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering, counted
+from trigpoint_ingest.core.anchors import IMAGE_SIGMA_M, SIGMA_LARGEST_M, AnchorRow
+from trigpoint_ingest.measured_anchors import replace_measured
+from trigpoint_tiles.anchoring import anchors_by_image
 from trigpoint_tiles.app import FORMATS, Rendered, RenderedGrid, render_ortho
-from trigpoint_tiles.image_registration import ImageRegistration, TileRegistration, register_image
+from trigpoint_tiles.core.check_layer import check_layer
+from trigpoint_tiles.core.image_anchors import ImageAnchor
+from trigpoint_tiles.core.image_tiles import ImageRegistration, TileRegistration
+from trigpoint_tiles.core.registration import REACH_M, REACH_MOST_M
+from trigpoint_tiles.image_registration import register_image
 from trigpoint_tiles.settings import TilesSettings
 
 FILE = click.Path(path_type=Path, dir_okay=False)
@@ -92,29 +103,120 @@ def _grid_values(grid: RenderedGrid) -> JsonObject:
     }
 
 
+def _registration_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A command that gets `ortho`, `image` and `reach_m`."""
+    for option in (
+        click.option(
+            "--reach-m",
+            type=click.FloatRange(0.5, REACH_MOST_M),
+            default=REACH_M,
+            show_default=True,
+            metavar="M",
+            help="How far the image may be off.",
+        ),
+        click.option(
+            "--image",
+            required=True,
+            metavar="PATH",
+            type=click.Path(path_type=Path),
+            help="A georeferenced aerial image, or a folder of web tiles {z}/{x}/{y}.",
+        ),
+        click.option(
+            "--ortho", required=True, metavar="FILE", type=FILE, help="ortho.tif of `trigpoint ortho render`."
+        ),
+    ):
+        function = option(function)
+    return function
+
+
 @command.command("register")
-@click.option("--ortho", required=True, metavar="FILE", type=FILE, help="ortho.tif of `trigpoint ortho render`.")
-@click.option(
-    "--image",
-    required=True,
-    metavar="PATH",
-    type=click.Path(path_type=Path),
-    help="A georeferenced aerial image, or a folder of web tiles {z}/{x}/{y}.",
-)
+@_registration_options
+@click.option("--out", metavar="FILE", type=FILE, help="The tiles' shifts as GeoJSON too, for GIS programs.")
 @answering
-def register(ortho: Path, image: Path, *, screen: Screen) -> Answer:
+def register(ortho: Path, image: Path, *, reach_m: float, out: Path | None, screen: Screen) -> Answer:
     """Measure where an aerial image shows the ground, less where the ortho layer has it, tile by tile."""
-    found = register_image(ortho, image)
+    found = register_image(ortho, image, reach_m=reach_m)
+    if out is not None:
+        _write(out, check_layer(found, image=image.stem))
+    shift_m, covariance_m2 = found.joined()
+    sigma_m = covariance_m2.diagonal() ** 0.5
     accepted = len(found.accepted)
-    sigma_m = found.covariance_m2.diagonal() ** 0.5
     values = {
+        "map_version": found.map_version,
         "pixel_m": found.pixel_m,
-        "shift_m": {"east": found.shift_m[0], "north": found.shift_m[1]},
+        "shift_m": {"east": shift_m[0], "north": shift_m[1]},
         "sigma_m": {"east": sigma_m[0], "north": sigma_m[1]},
         "tiles": {"count": len(found.tiles), "accepted": accepted, "items": list(map(_tile_values, found.tiles))},
     }
-    lines = (*map(_tile_line, found.tiles), _whole_line(found, accepted))
-    return Answer(values, lines)
+    return Answer(values, (*map(_tile_line, found.tiles), _whole_line(found)))
+
+
+def _write(path: Path, content: str) -> None:
+    try:
+        replace_durably(path, content.encode())
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error}") from error
+
+
+@command.command("anchors")
+@data_option
+@_registration_options
+@click.option("--name", metavar="ID", help="The image's name among anchors; that of its file or folder by default.")
+@click.option(
+    "--image-sigma-m",
+    type=click.FloatRange(0.0, SIGMA_LARGEST_M),
+    default=IMAGE_SIGMA_M,
+    show_default=True,
+    metavar="S",
+    help="1-sigma per axis of the image's own georeference.",
+)
+@click.option("--author", metavar="NAME", help="Who says so; the user this runs as by default.")
+@answering
+def anchors(
+    data: DataDirectory,
+    *,
+    name: str | None,
+    image_sigma_m: float,
+    author: str | None,
+    screen: Screen,
+    **asked: Any,
+) -> Answer:
+    """Tie the map to an aerial image: landmarks where tiles of the image show them become anchors.
+
+    They take the place of those measured in the same image before; the next map version is solved with them.
+    """
+    known_as = asked["image"].stem if name is None else name
+    found = register_image(**asked)
+    with data.opened_log() as log:
+        measured = anchors_by_image(log, found)
+        by = attributed(author, f"measured in {known_as} on map version {found.map_version}")
+        rows = [_anchor_row(one, crs=found.crs, image_sigma_m=image_sigma_m) for one in measured]
+        report = replace_measured(log, rows, image=known_as, by=by)
+    values = {
+        **anchor_values(report.imported),
+        "image": known_as,
+        "map_version": found.map_version,
+        "tiles": {"count": len(found.tiles), "accepted": len(found.accepted)},
+        "retracted": len(report.retracted.appended),
+    }
+    taken = report.imported
+    line = (
+        f"{known_as}: {taken.added} anchors measured ({taken.relabelled} of them anew), {taken.known} as before, "
+        f"{values['retracted']} of before retracted"
+    )
+    return Answer(values, (line,), taken.complaints())
+
+
+def _anchor_row(anchor: ImageAnchor, *, crs: str, image_sigma_m: float) -> AnchorRow:
+    return AnchorRow(
+        anchor=anchor.landmark,
+        x=anchor.easting_m,
+        y=anchor.northing_m,
+        crs=crs,
+        sigma_m=anchor.sigma_m,
+        image_sigma_m=image_sigma_m,
+        kind=anchor.kind,
+    )
 
 
 def _tile_values(tile: TileRegistration) -> JsonObject:
@@ -140,8 +242,11 @@ def _tile_line(tile: TileRegistration) -> str:
     return f"{place}  {shift}, confidence {found.confidence:.3f}"
 
 
-def _whole_line(found: ImageRegistration, accepted: int) -> str:
+def _whole_line(found: ImageRegistration) -> str:
+    accepted, count = len(found.accepted), counted(len(found.tiles), "tile")
     if not accepted:
-        return f"none of {counted(len(found.tiles), 'tile')} tells where the image lies"
-    shift = f"east {found.shift_m[0]:+.3f} m, north {found.shift_m[1]:+.3f} m"
-    return f"{accepted} of {counted(len(found.tiles), 'tile')}: the image shows the ground {shift} of the ortho layer"
+        return f"none of {count} tells where the image lies"
+    (east_m, north_m), _ = found.joined()
+    return (
+        f"{accepted} of {count}: the image shows the ground east {east_m:+.3f} m, north {north_m:+.3f} m of the layer"
+    )

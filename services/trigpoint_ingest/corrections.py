@@ -75,6 +75,14 @@ def retract_anchor(log: EventLog, anchor: str, *, image: str | None, by: Attribu
     return _appended(log, [] if standing.retracted else [retracted], asked=1, by=by)
 
 
+def retract_anchors(log: EventLog, named: Sequence[tuple[str, str]], *, by: Attribution) -> CorrectionReport:
+    """The anchors in force of these names and images retracted together."""
+    events = [
+        AnchorRetracted(anchor=anchor, image=image, author=by.author, reason=by.reason) for anchor, image in named
+    ]
+    return _appended(log, events, asked=len(events), by=by)
+
+
 def exclude_drives(log: EventLog, vehicle: str, *, boot_id: str | None, by: Attribution) -> CorrectionReport:
     """The vehicle's drive of this boot (None: all it has driven) excluded; one that is already stays so.
 

@@ -1,5 +1,5 @@
 """Lays the lidar points of all drives on the ground as rasters, and measures where aerial images lie beside them.
 
-Reads: MapFramePinned, MapSolved, PointsScanned, TrajectorySolved
+Reads: LandmarkSolved, MapFramePinned, MapSolved, PointsScanned, TrajectorySolved
 Writes: (nothing)
 """

@@ -100,7 +100,7 @@ FLOWS: tuple[Flow, ...] = (
     Flow(LandmarksPerceived, PERCEPTION, (OPTIMISATION, EVALUATION)),
     Flow(OdometryMatched, PERCEPTION, ()),
     Flow(TrajectorySolved, OPTIMISATION, (LANDMARKS, EVALUATION, TILES)),
-    Flow(LandmarkSolved, OPTIMISATION, (LANDMARKS, EVALUATION)),
+    Flow(LandmarkSolved, OPTIMISATION, (LANDMARKS, EVALUATION, TILES)),
     Flow(AnchorAssociated, OPTIMISATION, (LANDMARKS, EVALUATION)),
     Flow(ImageOffsetSolved, OPTIMISATION, (LANDMARKS, EVALUATION)),
     Flow(LabelGainSolved, OPTIMISATION, (LANDMARKS,)),

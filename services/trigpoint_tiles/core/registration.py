@@ -21,8 +21,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 SMOOTHING_PX = 1.0  # 1-sigma; finer edges are noise, coarser ones shadows and crowns of trees
-REACH_M = 3.0  # searched unless more is asked for
-BLOCK_M = 6.0  # what is in one block counts as one observation: about an object's size
+REACH_M, REACH_MOST_M = 3.0, 12.0  # searched unless more is asked for, and what can be: a street looks like the next
+BLOCK_M = 10.0  # what is in one block counts as one observation: about a street's width, along which edges go on
 HEIGHTS_M = (1.0, 2.5, 4.0, 6.0, 9.0, 14.0)  # between heights that are taken as one
 LEAN_SIGMA = 0.1  # metres a metre of height; aerial cameras see 0 to 0.3, mosaics use the middle of their images
 LEAN_LIMIT = 0.4

@@ -92,5 +92,5 @@ def test_ground_of_one_colour_is_refused_with_the_reason() -> None:
 
 def test_a_tile_that_cannot_be_shifted_is_refused_with_its_size_and_the_least() -> None:
     small = np.ones((30, 30))
-    with pytest.raises(InputError, match="30 x 30 pixels .* at least 60"):
+    with pytest.raises(InputError, match="30 x 30 pixels .* at least 54"):
         registered([small, small], small, [small], pixel_m=PIXEL_M)
