@@ -1,14 +1,21 @@
 """`trigpoint ortho`: the lidar points of all drives as rasters, and where aerial images lie beside them."""
 
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
 from trigpoint.errors import InputError
-from trigpoint_cli.data_dir import DataDirectory, data_option
+from trigpoint.logs.mcap_log import McapLog
+from trigpoint.logs.ports import RecallingLog
+from trigpoint.workers import workers
+from trigpoint_cli.data_dir import DataDirectory, cluster_option, data_option
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering, counted
 from trigpoint_tiles.app import FORMATS, Rendered, RenderedGrid, render_ortho
+from trigpoint_tiles.hands import Hands
 from trigpoint_tiles.image_registration import ImageRegistration, TileRegistration, register_image
 from trigpoint_tiles.settings import TilesSettings
 
@@ -32,8 +39,11 @@ def command() -> None:
     "--resolution-m", type=click.FloatRange(0.01, 100.0), default=DEFAULTS.resolution_m, show_default=True, metavar="M"
 )
 @click.option("--attribution", default=DEFAULTS.attribution, metavar="TEXT", help="Whom the data is from.")
+@cluster_option
 @answering
-def render(data: DataDirectory, out: Path, *, crs: str | None, formats: str, screen: Screen, **asked: Any) -> Answer:
+def render(
+    data: DataDirectory, out: Path, *, crs: str | None, formats: str, cluster: str, screen: Screen, **asked: Any
+) -> Answer:
     """Lay the points of all drives on the ground by the newest map version's paths.
 
     Into DIR come ortho.tif (COG), ortho.pmtiles, xyz/{z}/{x}/{y}.png and rasters.toml for the viewer's configuration.
@@ -43,9 +53,25 @@ def render(data: DataDirectory, out: Path, *, crs: str | None, formats: str, scr
     if unknown := [name for name in chosen if name not in FORMATS]:
         raise InputError(f"--format {formats}: no {', '.join(unknown)}; there are {', '.join(FORMATS)}")
     settings = TilesSettings(**asked)
-    with data.opened_log() as log, screen.part_of("laying out sweeps") as progress:
-        found = render_ortho(log, out, formats=chosen, crs=crs, settings=settings, progress=progress)
+    with ExitStack() as stack:
+        log = stack.enter_context(data.opened_log())
+        hands = Hands(
+            stack.enter_context(workers(cluster)),
+            partial(_opened, data.log.absolute()),
+            laying_out=stack.enter_context(screen.part_of("laying out sweeps")),
+            rendering=stack.enter_context(screen.part_of("rendering tiles")),
+        )
+        found = render_ortho(log, out, formats=chosen, crs=crs, settings=settings, hands=hands)
     return _render_answer(found)
+
+
+@contextmanager
+def _opened(folder: Path) -> Iterator[RecallingLog]:
+    log = McapLog(folder)
+    try:
+        yield log
+    finally:
+        log.close()
 
 
 def _render_answer(found: Rendered) -> Answer:
