@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-PIECE_SWEEPS = 1000  # gathered by one worker: what its death costs
+PIECE_SWEEPS = 400  # gathered by one worker: what its death costs
 
 
 class DrivePlan:

@@ -4,18 +4,18 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
 from raster_peers.datashader_race import POINTS, turn
 from scanned_drives.examples import POSE_NS, START_NS, SWEEP_NS, Floats, map_rows, pinned, solved_path
-from trigpoint.errors import TrigpointError
 from trigpoint.events.codec import Event
 from trigpoint.events.envelope import Envelope, EventIdentity, LogPosition
 from trigpoint.events.runs import EncodedRun
 from trigpoint.logs.mcap_log import McapLog
 from trigpoint.logs.memory_log import MemoryLog
-from trigpoint.logs.ports import LoggedEvent
+from trigpoint.logs.ports import LoggedEvent, RecallingLog
 
 VEHICLE, STREAM, PREFIX = "recorded", "veh-recorded", "veh-"
 SWEEPS = 694  # just under 20 million points
@@ -44,7 +44,8 @@ def points_of(drives: int, sweeps: int = SWEEPS) -> int:
 
 @dataclass(frozen=True, slots=True)
 class ReplayedLog:
-    """Reads the recorded drive as that of each vehicle, file by file and cloud by cloud, and its own map version."""
+    """Reads the recorded drive as that of each vehicle, decoding it anew for each, and a map version: what rendering
+    asks of a RecallingLog."""
 
     recorded: McapLog
     mapped: MemoryLog
@@ -80,20 +81,16 @@ class ReplayedLog:
         for run in self.recorded.read_headers(STREAM):
             yield replace(run, source=stream.removeprefix(PREFIX))
 
-    def append(self, stream: str, rows: Sequence[Envelope[Event] | EncodedRun]) -> LogPosition:
-        """Refused: a replay is only read."""
-        raise TrigpointError(f"{len(rows)} rows for {stream}: a replay is only read")
-
 
 @contextmanager
-def replayed_log(folder: Path, drives: int, sweeps: int = SWEEPS) -> Iterator[ReplayedLog]:
+def replayed_log(folder: Path, drives: int, sweeps: int = SWEEPS) -> Iterator[RecallingLog]:
     """The drive recorded in a folder as that of so many vehicles."""
     recorded, mapped = McapLog(folder), MemoryLog()
     mapped.append("map", [pinned()])
     paths = [solved_path(_vehicle(number), _way(number, sweeps)) for number in range(drives)]
     mapped.append("optimisation", map_rows(paths))
     try:
-        yield ReplayedLog(recorded, mapped, drives)
+        yield cast(RecallingLog, ReplayedLog(recorded, mapped, drives))
     finally:
         recorded.close()
 
