@@ -1,6 +1,8 @@
 """`trigpoint ortho`: the lidar points of all drives as rasters, and where aerial images lie beside them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -8,9 +10,12 @@ import click
 
 from trigpoint.durable_files import replace_durably
 from trigpoint.errors import InputError
+from trigpoint.logs.mcap_log import McapLog
+from trigpoint.logs.ports import RecallingLog
+from trigpoint.workers import workers
 from trigpoint_cli.anchors import anchor_values
 from trigpoint_cli.corrections import attributed
-from trigpoint_cli.data_dir import DataDirectory, data_option
+from trigpoint_cli.data_dir import DataDirectory, cluster_option, data_option
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering, counted
 from trigpoint_ingest.core.anchors import IMAGE_SIGMA_M, SIGMA_LARGEST_M, AnchorRow
 from trigpoint_ingest.measured_anchors import replace_measured
@@ -20,6 +25,7 @@ from trigpoint_tiles.core.check_layer import check_layer
 from trigpoint_tiles.core.image_anchors import ImageAnchor
 from trigpoint_tiles.core.image_tiles import ImageRegistration, TileRegistration
 from trigpoint_tiles.core.registration import REACH_M, REACH_MOST_M
+from trigpoint_tiles.hands import Hands
 from trigpoint_tiles.image_registration import register_image
 from trigpoint_tiles.settings import TilesSettings
 
@@ -46,8 +52,11 @@ def command() -> None:
     "--deskew/--no-deskew", default=DEFAULTS.deskew, show_default=True, help="Place points by the pose at their time."
 )
 @click.option("--attribution", default=DEFAULTS.attribution, metavar="TEXT", help="Whom the data is from.")
+@cluster_option
 @answering
-def render(data: DataDirectory, out: Path, *, crs: str | None, formats: str, screen: Screen, **asked: Any) -> Answer:
+def render(
+    data: DataDirectory, out: Path, *, crs: str | None, formats: str, cluster: str, screen: Screen, **asked: Any
+) -> Answer:
     """Lay the points of all drives on the ground by the newest map version's paths.
 
     Into DIR come ortho.tif (COG), ortho.pmtiles, xyz/{z}/{x}/{y}.png and rasters.toml for the viewer's configuration.
@@ -57,9 +66,25 @@ def render(data: DataDirectory, out: Path, *, crs: str | None, formats: str, scr
     if unknown := [name for name in chosen if name not in FORMATS]:
         raise InputError(f"--format {formats}: no {', '.join(unknown)}; there are {', '.join(FORMATS)}")
     settings = TilesSettings(**asked)
-    with data.opened_log() as log, screen.part_of("laying out sweeps") as progress:
-        found = render_ortho(log, out, formats=chosen, crs=crs, settings=settings, progress=progress)
+    with ExitStack() as stack:
+        log = stack.enter_context(data.opened_log())
+        hands = Hands(
+            stack.enter_context(workers(cluster)),
+            partial(_opened, data.log.absolute()),
+            laying_out=stack.enter_context(screen.part_of("laying out sweeps")),
+            rendering=stack.enter_context(screen.part_of("rendering tiles")),
+        )
+        found = render_ortho(log, out, formats=chosen, crs=crs, settings=settings, hands=hands)
     return _render_answer(found)
+
+
+@contextmanager
+def _opened(folder: Path) -> Iterator[RecallingLog]:
+    log = McapLog(folder)
+    try:
+        yield log
+    finally:
+        log.close()
 
 
 def _render_answer(found: Rendered) -> Answer:

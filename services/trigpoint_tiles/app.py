@@ -1,9 +1,10 @@
 """The ortho layer of a log's newest map version as files."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from hashlib import blake2b
 from pathlib import Path
 
@@ -15,20 +16,22 @@ from trigpoint.geodesy.projection import MapFrame, wgs84_from_map
 from trigpoint.geodesy.web_tiles import WebTile
 from trigpoint.logs.ports import RecallingLog
 from trigpoint.logs.readings import logged_frame, logged_maps
+from trigpoint.workers import Tally
 from trigpoint_tiles.clouds import DriveClouds, logged_clouds
-from trigpoint_tiles.core.grid import RasterGrid, TileBox, box_of, projected_grid, web_mercator_grid
+from trigpoint_tiles.core.grid import RasterGrid, Tile, TileBox, box_of, projected_grid, web_mercator_grid
 from trigpoint_tiles.core.pictures import picture
 from trigpoint_tiles.geotiff import write_cog
 from trigpoint_tiles.grid_layer import BroughtUp, GridLayer
+from trigpoint_tiles.hands import Hands, own_hands
 from trigpoint_tiles.picture_files import PictureFolder, bounds_deg, write_pmtiles
 from trigpoint_tiles.settings import TilesSettings
+from trigpoint_tiles.tile_rendering import BandsFolder, together
 
 COG, PMTILES, XYZ = "cog", "pmtiles", "xyz"
 FORMATS = (COG, PMTILES, XYZ)
 NAME = "ortho"
 NAME_MOST = 80  # characters of a folder's name
 YEAR_S = 365.2425 * 86400.0
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,13 +62,14 @@ def render_ortho(
     formats: tuple[str, ...] = FORMATS,
     crs: str | None = None,
     settings: TilesSettings | None = None,
-    progress: Progress = lambda done, total: None,
+    hands: Hands | None = None,
 ) -> Rendered:
     """The points of all drives on the newest map version's paths, as files in a folder; what has not changed since the
     last time stays as it is.
 
-    `crs` is that of the COG, the map's own by default. Drives without a path are counted and left out. Raises
-    InputError where there is no map version, no sweep with a path, or a file cannot be written.
+    `crs` is that of the COG, the map's own by default. `hands` do the work, by default the caller's own. Drives
+    without a path are counted and left out. Raises InputError where there is no map version, no sweep with a path, or
+    a file cannot be written, ServiceError where workers failed.
     """
     chosen, frame = settings or TilesSettings(), logged_frame(log)
     solved = next(reversed(logged_maps(log)), None)
@@ -84,7 +88,7 @@ def render_ortho(
         drives=drives,
         tags=_tags(solved, frame, drives, chosen),
         settings=chosen,
-        progress=progress,
+        hands=hands or own_hands(log),
     )
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -134,7 +138,7 @@ class _Job:
     drives: tuple[DriveClouds, ...]
     tags: Mapping[str, str]
     settings: TilesSettings
-    progress: Progress
+    hands: Hands
 
     def layer(self, grid: RasterGrid) -> tuple[GridLayer, BroughtUp]:
         """A grid's tiles, brought up."""
@@ -143,14 +147,9 @@ class _Job:
             named.replace(":", "-") if len(named) < NAME_MOST else blake2b(named.encode(), digest_size=16).hexdigest()
         )
         layer = GridLayer(self.out / "work" / safe, self.frame, grid, self.settings)
-        done, total = 0, sum(len(one.sequence) for one in self.drives)
-
-        def heard(count: int) -> None:
-            nonlocal done
-            done += count
-            self.progress(done, total)
-
-        return layer, layer.bring_up(self.log, self.drives, progress=heard)
+        heard = Tally(sum(len(one.sequence) for one in self.drives), self.hands.laying_out)
+        found = layer.bring_up(self.log, self.drives, progress=heard.more, hands=self.hands)
+        return layer, found
 
 
 def _write_cog(job: _Job, crs: str) -> tuple[RenderedGrid, Path]:
@@ -173,7 +172,7 @@ def _write_pictures(job: _Job, *, formats: tuple[str, ...]) -> tuple[RenderedGri
     layer, found = job.layer(grid)
     _box(found)
     pictures = PictureFolder(job.out / XYZ if XYZ in formats else job.out / "work" / XYZ)
-    _write_tiles(layer, found, pictures, zoom, zoom_least=max(0, zoom - job.settings.zooms))
+    _write_tiles(job.hands, layer, found, pictures, zoom_least=max(0, zoom - job.settings.zooms))
     bounds = bounds_deg(WebTile(zoom, tile.column, tile.row) for tile in found.tiles)
     files = [pictures.folder] if XYZ in formats else []
     if XYZ in formats:
@@ -194,17 +193,26 @@ def _web_grid(job: _Job) -> RasterGrid:
     return web_mercator_grid(start, resolution_m=job.settings.resolution_m)
 
 
-def _write_tiles(layer: GridLayer, found: BroughtUp, pictures: PictureFolder, zoom: int, *, zoom_least: int) -> None:
+def _write_tiles(hands: Hands, layer: GridLayer, found: BroughtUp, pictures: PictureFolder, *, zoom_least: int) -> None:
     """The pictures of what was rendered now, of what is missing, and of all tiles above those."""
+    zoom = layer.zoom
     there = {tile for tile in pictures.tiles() if tile.zoom == zoom}
     wanted = {WebTile(zoom, tile.column, tile.row): tile for tile in found.tiles}
     anew = {web for web, tile in wanted.items() if tile in found.rendered or web not in there}
-    for web in sorted(anew, key=lambda one: (one.row, one.column)):
-        pictures.write(web, picture(layer.bands(wanted[web])))
+    ordered = sorted(anew, key=lambda one: (one.row, one.column))
+    write = partial(write_pictures, layer.bands_folder, pictures)
+    for _ in hands.each("groups of tiles not drawn", write, together(ordered)):
+        pass
     gone = there - wanted.keys()
     for web in gone:
         pictures.path(web).unlink()
     pictures.write_ancestors(anew | gone, zoom_least=zoom_least)
+
+
+def write_pictures(bands: BandsFolder, pictures: PictureFolder, tiles: tuple[WebTile, ...]) -> None:
+    """The pictures of some tiles, which have bands."""
+    for web in tiles:
+        pictures.write(web, picture(bands.read(Tile(web.column, web.row))))
 
 
 def viewer_configuration(

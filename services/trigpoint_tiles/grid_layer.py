@@ -4,28 +4,26 @@ import json
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from trigpoint.durable_files import replace_durably
-from trigpoint.errors import InputError
 from trigpoint.geodesy.projection import MapFrame
-from trigpoint.geodesy.web_tiles import WebTile, tile_edges_deg, tile_size_m
 from trigpoint.logs.ports import RecallingLog
 from trigpoint_tiles.clouds import DriveClouds
-from trigpoint_tiles.core.balance import Brightness, balanced_gains, brightness
-from trigpoint_tiles.core.cells import Cells
-from trigpoint_tiles.core.grid import TILE_PX, RasterGrid, Tile
-from trigpoint_tiles.core.part_form import bands_bytes, bands_from
-from trigpoint_tiles.core.rendering import Bands, rendered
-from trigpoint_tiles.drive_gathering import DriveGatherer, GatheredDrive, SweepCounts, SweepDone
+from trigpoint_tiles.core.balance import Brightness, balanced_gains
+from trigpoint_tiles.core.grid import RasterGrid, Tile
+from trigpoint_tiles.core.rendering import Bands
+from trigpoint_tiles.drive_gathering import PieceGathering, SweepCounts, SweepDone
+from trigpoint_tiles.drive_plans import DrivePlan, DrivePlanner
+from trigpoint_tiles.hands import Hands, own_hands
 from trigpoint_tiles.part_files import DriveParts
 from trigpoint_tiles.settings import TilesSettings
+from trigpoint_tiles.tile_rendering import BandsFolder, SeenTile, brightness_of, together
 
-FORM = 1  # of what stands in the folder; another one is made anew
+FORM = 2  # of what stands in the folder; another one is made anew
 STATE = "state.json"
 
 
@@ -44,73 +42,84 @@ class GridLayer:
     """A folder with each drive's parts, each tile's bands, and what they were made from."""
 
     def __init__(self, folder: Path, frame: MapFrame, grid: RasterGrid, settings: TilesSettings) -> None:
-        self._folder, self._frame, self._grid, self._settings = folder, frame, grid, settings
+        self._folder, self._frame, self._grid, self._settings = folder.absolute(), frame, grid, settings
+        self._bands = BandsFolder(self._folder / "bands", grid)
 
-    def bring_up(self, log: RecallingLog, drives: Iterable[DriveClouds], *, progress: SweepDone) -> BroughtUp:
-        """The tiles of the drives as their paths are now. Raises InputError."""
-        before = self._state()
+    def bring_up(
+        self,
+        log: RecallingLog,
+        drives: Iterable[DriveClouds],
+        *,
+        progress: SweepDone,
+        hands: Hands | None = None,
+    ) -> BroughtUp:
+        """The tiles of the drives as their paths are now, done by `hands`, the caller's own where none are given;
+        `progress` is told of sweeps.
+
+        What a worker's death cost is done again by another. Raises InputError, and ServiceError where that failed too:
+        once everything else is done, so that the next time little is left.
+        """
+        chosen, before = hands or own_hands(log), self._state()
         if before is None:
-            shutil.rmtree(self._folder / "bands", ignore_errors=True)
+            shutil.rmtree(self._bands.folder, ignore_errors=True)
         (self._folder / STATE).unlink(missing_ok=True)  # until all is done
-        gatherer = DriveGatherer(log, self._frame, self._grid, self._settings)
-        found: dict[str, GatheredDrive] = {}
-        for clouds in drives:
-            parts = DriveParts(self._drive_folder(clouds))
-            found[str(clouds.name)] = gatherer.gathered(clouds, parts, progress=progress)
-        changed = self._without_drives({one.parts.folder for one in found.values()})
-        changed |= frozenset[Tile]().union(*(one.changed for one in found.values()))
-        return self._rendered(found, changed, before or {})
+        self._bands.folder.mkdir(parents=True, exist_ok=True)
+        plans = self._gathered(drives, chosen, progress)
+        changed = self._without_drives({plan.parts.folder for plan in plans.values()})
+        changed |= frozenset[Tile]().union(*(plan.changed for plan in plans.values()))
+        return self._rendered(plans, changed, before or {}, _TileWork(chosen))
 
     def bands(self, tile: Tile) -> Bands:
         """A rendered tile's bands (5, 256, 256). Raises InputError for a damaged file."""
-        path = self._bands_path(tile)
-        try:
-            return bands_from(path.read_bytes())
-        except InputError as error:
-            raise InputError(f"{path}: {error}; remove {self._folder} to make it again") from error
+        return self._bands.read(tile)
 
     def all_bands(self, tiles: Iterable[Tile]) -> Iterator[tuple[Tile, Bands]]:
         """Tiles with their bands, from north to south."""
         for tile in sorted(tiles, key=lambda tile: (tile.row, tile.column)):
             yield tile, self.bands(tile)
 
+    @property
+    def bands_folder(self) -> BandsFolder:
+        """Where the bands stand, for workers elsewhere."""
+        return self._bands
+
+    @property
+    def zoom(self) -> int:
+        """That of the web tiles these are, 0 for others."""
+        return self._grid.zoom or 0
+
+    def _gathered(self, drives: Iterable[DriveClouds], hands: Hands, progress: SweepDone) -> dict[str, DrivePlan]:
+        planner = DrivePlanner(self._frame, self._grid, self._settings)
+        plans = {str(one.name): planner.plan(one, DriveParts(self._drive_folder(one))) for one in drives}
+        by_folder = {plan.parts.folder: plan for plan in plans.values()}
+        heard = progress if hands.some.are_here else None
+        gathering = PieceGathering(hands.open_log, self._frame, self._grid, self._settings, heard)
+        pieces = (piece for plan in plans.values() for piece in plan.begun())
+        for piece, gathered in hands.each("pieces of drives not gathered", gathering, pieces):
+            by_folder[piece.folder].take(piece, gathered)
+            if heard is None:
+                progress(len(gathered.box))
+        return plans
+
     def _rendered(
-        self, drives: Mapping[str, GatheredDrive], changed: frozenset[Tile], before: Mapping[str, Any]
+        self, drives: Mapping[str, DrivePlan], changed: frozenset[Tile], before: Mapping[str, Any], work: "_TileWork"
     ) -> BroughtUp:
-        tiles_by_drive = {name: one.parts.tiles() for name, one in drives.items()}
-        tiles = frozenset[Tile]().union(*tiles_by_drive.values())
+        seen = _seen_tiles(drives)
+        tiles = frozenset(seen)
         bright = {tile: known for tile, known in _known_brightness(before).items() if tile in tiles - changed}
-        for tile in tiles - bright.keys():
-            bright[tile] = brightness(
-                {n: one.parts.cells(tile) for n, one in drives.items() if tile in tiles_by_drive[n]}
-            )
+        bright |= work.brightness([seen[tile] for tile in sorted(tiles - bright.keys())])
         gains = balanced_gains([bright[tile] for tile in sorted(bright)])
-        brighter = [name for name, gain in gains.items() if before.get("gains", {}).get(name) != gain]
-        anew = (changed & tiles).union(*(tiles_by_drive[name] for name in brighter))
-        anew |= {tile for tile in tiles if not self._bands_path(tile).exists()}
-        for tile in anew:
-            here = {name: one.parts.cells(tile) for name, one in drives.items() if tile in tiles_by_drive[name]}
-            self._write_bands(tile, here, gains)
+        brighter = {name for name, gain in gains.items() if before.get("gains", {}).get(name) != gain}
+        anew = changed & tiles
+        anew |= {one.tile for one in seen.values() if not brighter.isdisjoint(name for name, _ in one.drives)}
+        anew |= {tile for tile in tiles if not self._bands.path(tile).exists()}
+        work.render(self._bands, gains, [seen[tile] for tile in sorted(anew)])
         gone = changed - tiles
         for tile in gone:
-            self._bands_path(tile).unlink(missing_ok=True)
+            self._bands.path(tile).unlink(missing_ok=True)
         self._write_state(gains, bright)
         counts = {name: one.counts for name, one in drives.items()}
-        return BroughtUp(tiles=tiles, rendered=frozenset(anew), gone=gone, gains=gains, counts=counts)
-
-    def _write_bands(self, tile: Tile, drives: Mapping[str, Cells], gains: Mapping[str, float]) -> None:
-        names = sorted(drives)
-        bands = rendered(
-            [drives[name] for name in names],
-            [gains[name] for name in names],
-            pixel_area_m2=_ground_pixel_m(self._grid, tile) ** 2,
-        )
-        path = self._bands_path(tile)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(bands_bytes(bands))
-
-    def _bands_path(self, tile: Tile) -> Path:
-        return self._folder / "bands" / f"{tile.column}_{tile.row}.bands"
+        return BroughtUp(tiles=tiles, rendered=anew, gone=gone, gains=gains, counts=counts)
 
     def _drive_folder(self, clouds: DriveClouds) -> Path:
         return self._folder / "drives" / f"veh-{clouds.name.vehicle}" / f"boot-{clouds.name.boot_id}"
@@ -154,6 +163,35 @@ class GridLayer:
         replace_durably(self._folder / STATE, json.dumps({"gains": gains, "brightness": tiles}).encode())
 
 
+@dataclass(frozen=True, slots=True)
+class _TileWork:
+    """Tiles done by hands."""
+
+    hands: Hands
+
+    def brightness(self, tiles: list[SeenTile]) -> dict[Tile, Brightness]:
+        found: dict[Tile, Brightness] = {}
+        for _, some in self.hands.each("groups of tiles not looked at", brightness_of, together(tiles)):
+            found |= some
+        return found
+
+    def render(self, bands: BandsFolder, gains: Mapping[str, float], tiles: list[SeenTile]) -> None:
+        done = 0
+        write = partial(bands.write, gains)
+        for some, _ in self.hands.each("groups of tiles not rendered", write, together(tiles)):
+            done += len(some)
+            self.hands.rendering(done, len(tiles))
+
+
+def _seen_tiles(drives: Mapping[str, DrivePlan]) -> dict[Tile, SeenTile]:
+    """Every tile with the drives that saw it."""
+    folders: dict[Tile, list[tuple[str, Path]]] = {}
+    for name, plan in sorted(drives.items()):
+        for tile in plan.parts.tiles():
+            folders.setdefault(tile, []).append((name, plan.parts.folder))
+    return {tile: SeenTile(tile, tuple(found)) for tile, found in folders.items()}
+
+
 def _known_brightness(state: Mapping[str, Any]) -> dict[Tile, Brightness]:
     return {
         Tile(column, row): Brightness(
@@ -162,11 +200,3 @@ def _known_brightness(state: Mapping[str, Any]) -> dict[Tile, Brightness]:
         )
         for column, row, levels, ratios in state.get("brightness", [])
     }
-
-
-def _ground_pixel_m(grid: RasterGrid, tile: Tile) -> float:
-    """The side of a tile's pixels on the ground; a projected CRS is taken as true to scale."""
-    if grid.zoom is None:
-        return grid.pixel_m
-    _, south, _, north = tile_edges_deg(WebTile(grid.zoom, tile.column, tile.row))
-    return float(tile_size_m(np.array([0.5 * (south + north)]), grid.zoom)[0]) / TILE_PX

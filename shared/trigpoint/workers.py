@@ -90,6 +90,23 @@ class Workers:
         return bool(under_way)
 
 
+class _InTurn(Executor):
+    """Does what it is given at once, in the thread that gives it."""
+
+    def submit(self, fn: Callable[..., Result], /, *args: Any, **kwargs: Any) -> Future[Result]:
+        future: Future[Result] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:  # what the caller finds in the future
+            future.set_exception(error)
+        return future
+
+
+def in_turn() -> Workers:
+    """Every piece done by the caller's own thread, one after the other."""
+    return Workers(_InTurn(), 1, are_here=True)
+
+
 @contextmanager
 def workers(cluster: str = "", *, threads: int = 0) -> Iterator[Workers]:
     """Threads of this process (0: one a core), or the workers of the Dask scheduler at an address such as

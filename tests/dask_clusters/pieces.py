@@ -1,8 +1,12 @@
 """Work that a cluster's workers import by name."""
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+
+from trigpoint.logs.mcap_log import McapLog
 
 DEADLY = -1
 
@@ -34,3 +38,21 @@ def deadly_once(item: tuple[int, Path]) -> int:
         died.touch()
         os._exit(1)
     return number
+
+
+@contextmanager
+def opened_log(folder: Path) -> Iterator[McapLog]:
+    """A log, open for one piece."""
+    log = McapLog(folder)
+    yield log
+    log.close()
+
+
+@contextmanager
+def opened_after_a_death(folder: Path, died: Path) -> Iterator[McapLog]:
+    """A log; the first to open it ends its process, and leaves a file that says so."""
+    if not died.exists():
+        died.touch()
+        os._exit(1)
+    with opened_log(folder) as log:
+        yield log

@@ -51,13 +51,13 @@ def race(grid: RasterGrid) -> Race:
     numba.set_num_threads(1)
     path = path_of(solved_path("car", arc(0.1 * SWEEPS + 1.0)))
     random = np.random.default_rng(1)
-    rows = [(START_NS + SWEEP_NS * number, _turn(random)) for number in range(SWEEPS)]
+    rows = [(START_NS + SWEEP_NS * number, turn(random)) for number in range(SWEEPS)]
     total = SWEEPS * POINTS
     by_kernel = _best(lambda: _gather(rows, path, grid))
     return Race(total / by_kernel, total / _best(lambda: _shade(rows, path, grid)))
 
 
-def _turn(random: np.random.Generator) -> PointsScanned:
+def turn(random: np.random.Generator) -> PointsScanned:
     """One turn of a spinning lidar of 16 beams, 30 degrees high, over flat ground between walls all around."""
     bearing_rad = np.repeat(np.linspace(0.0, 2.0 * np.pi, DIRECTIONS, endpoint=False), BEAMS)
     up_rad = np.tile(np.radians(np.linspace(-15.0, 15.0, BEAMS)), DIRECTIONS)

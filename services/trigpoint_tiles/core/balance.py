@@ -1,6 +1,6 @@
 """How bright each drive's lidar saw the ground, so that no seam shows where one drive's pixels meet another's."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,10 +25,10 @@ class Brightness:
     ratios: Mapping[tuple[str, str], tuple[float, int]]
 
 
-def brightness(drives: Mapping[str, Cells]) -> Brightness:
-    """How bright a tile's drives, by name, saw its ground."""
+def brightness(drives: Iterable[tuple[str, Cells]]) -> Brightness:
+    """How bright a tile's drives, each with its name, saw its ground."""
     levels, ratios, logs = {}, {}, {}
-    for name, cells in drives.items():
+    for name, cells in drives:
         enough = (cells[..., GROUND_COUNT] >= POINTS_LEAST) & (cells[..., GROUND_INTENSITY] > 0)
         mean = cells[..., GROUND_INTENSITY] / np.maximum(cells[..., GROUND_COUNT], 1) / INTENSITY_STEPS
         logs[name] = np.where(enough, np.log2(np.where(enough, mean, 1.0)), np.nan)

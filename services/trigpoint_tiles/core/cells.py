@@ -34,11 +34,3 @@ WHILE_GATHERING = (GROUND_LAST, LOW_LAST)
 ZERO_MM = 1_000_000  # heights within a kilometre of the ground under the vehicle
 INTENSITY_STEPS = 1024.0
 MM = 1000.0
-
-
-def merge_cells(total: Cells, part: Cells) -> None:
-    """Adds a part (..., FIELDS) to a total of the same shape, in place."""
-    highest = np.maximum(total[..., EXTREMES], part[..., EXTREMES])
-    total += part
-    total[..., EXTREMES] = highest
-    total[..., WHILE_GATHERING] = 0

@@ -19,11 +19,11 @@ from trigpoint.errors import InputError
 from trigpoint.events.scanned import PointsScanned
 from trigpoint.geodesy.poses import transform_points
 from trigpoint_tiles.core.accumulator import SLOT_BYTES, Accumulator
-from trigpoint_tiles.core.cells import FIELDS, GROUND_COUNT, GROUND_INTENSITY, INTENSITY_STEPS, Cells, merge_cells
+from trigpoint_tiles.core.cells import FIELDS, GROUND_COUNT, GROUND_INTENSITY, INTENSITY_STEPS, Cells
 from trigpoint_tiles.core.driven_path import DrivenPath, path_of
 from trigpoint_tiles.core.gathering import RangeLimits
 from trigpoint_tiles.core.grid import TILE_PX, RasterGrid, Tile, projected_grid, web_mercator_zoom
-from trigpoint_tiles.core.part_form import cells_from, part_bytes
+from trigpoint_tiles.core.part_form import merge_part, part_bytes
 from trigpoint_tiles.core.placement import SweepPlacer, exact_pixels
 
 UTM = projected_grid(FRAME.crs, resolution_m=0.2)
@@ -38,6 +38,11 @@ def sweeps(count: int, *, seed: int = 3) -> list[tuple[int, PointsScanned]]:
     return [(stamp, sweep_at(PATH, stamp, painted_ground, random)) for stamp in stamps]
 
 
+def no_cells() -> Cells:
+    """A tile nobody saw."""
+    return np.zeros((TILE_PX, TILE_PX, FIELDS), dtype=np.int64)
+
+
 def gathered(
     rows: list[tuple[int, PointsScanned]],
     grid: RasterGrid = UTM,
@@ -50,7 +55,7 @@ def gathered(
     total: dict[Tile, Cells] = {}
 
     def keep(tile: Tile, cells: Cells) -> None:
-        merge_cells(total.setdefault(tile, np.zeros((TILE_PX, TILE_PX, FIELDS), dtype=np.int64)), cells)
+        merge_part(total.setdefault(tile, no_cells()), part_bytes(cells))
 
     accumulator, placer = Accumulator(memory_bytes=memory, hand_on=keep), SweepPlacer(FRAME, grid, reach_m=reach_m)
     for stamp_ns, sweep in rows:
@@ -102,7 +107,7 @@ def test_any_order_and_any_split_of_the_sweeps_gives_the_same_cells() -> None:
     forward, backward = gathered(rows), gathered(rows[::-1])
     split = gathered(rows[:3])
     for tile, cells in gathered(rows[3:]).items():
-        merge_cells(split.setdefault(tile, np.zeros_like(cells)), cells)
+        merge_part(split.setdefault(tile, no_cells()), part_bytes(cells))
     assert forward.keys() == backward.keys() == split.keys()
     assert all(np.array_equal(forward[tile], backward[tile]) for tile in forward)
     assert all(np.array_equal(forward[tile], split[tile]) for tile in forward)
@@ -157,10 +162,11 @@ def test_an_empty_sweep_hits_nothing() -> None:
 
 def test_a_part_is_read_as_it_was_written_and_a_damaged_one_is_refused() -> None:
     cells = next(iter(gathered(sweeps(2)).values()))
-    content = part_bytes(cells)
-    assert np.array_equal(cells_from(content), cells)
+    content, found = part_bytes(cells), no_cells()
+    merge_part(found, content)
+    assert np.array_equal(found, cells)
     with pytest.raises(InputError, match="damaged"):
-        cells_from(content[:-20] + bytes(20))
+        merge_part(no_cells(), content[:-20] + bytes(20))
 
 
 def test_a_path_between_its_poses_is_an_arc() -> None:

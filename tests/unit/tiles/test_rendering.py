@@ -87,7 +87,7 @@ def test_a_drive_twice_as_bright_is_made_half_as_bright() -> None:
     dark[..., GROUND_INTENSITY] = random.integers(20, 90, (16, 16)) * 4 * STEP
     bright = dark.copy()
     bright[..., GROUND_INTENSITY] *= 2
-    gains = balanced_gains([brightness({"a": dark, "b": bright})])
+    gains = balanced_gains([brightness([("a", dark), ("b", bright)])])
     # Gains are rounded to steps of 1/64 octave; the drives' own means pull by 1 in 257.
     assert abs(np.log2(gains["a"] / gains["b"]) - 1.0) <= 1.0 / STEPS_PER_OCTAVE + 2.0 / 257
 
@@ -98,7 +98,7 @@ def test_drives_balanced_through_a_third_one_agree() -> None:
     thrice, fifth = ground.copy(), ground.copy()
     thrice[..., GROUND_INTENSITY] *= 3
     fifth[..., GROUND_INTENSITY] //= 5
-    tiles = [brightness({"a": ground, "b": thrice}), brightness({"b": thrice, "c": fifth})]
+    tiles = [brightness([("a", ground), ("b", thrice)]), brightness([("b", thrice), ("c", fifth)])]
     gains = balanced_gains(tiles)
     assert abs(np.log2(gains["a"] / (3 * gains["b"]))) < 0.05
     assert abs(np.log2(3 * gains["b"] * 5 / gains["c"])) < 2.0  # clipped at two octaves a cell: 15 is 3.9
