@@ -14,7 +14,9 @@ Bools = NDArray[np.bool_]
 
 GAP_STEPS = 3.5  # azimuth steps without a return between two points: nothing connects them
 STEP_SAMPLED_EVERY = 7  # points: enough to know the step between neighbours
-AZIMUTH_STEPS = 1 << 20  # of a full turn: finer than any sensor's encoder
+DIGIT_BITS = 11
+DIGITS = 1 << DIGIT_BITS
+AZIMUTH_STEPS = DIGITS * DIGITS - 1  # of a full turn: finer than any sensor's encoder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,8 +60,7 @@ class Segments:
 
 def ordered_sweep(sweep: Sweep, height_m: Floats) -> OrderedSweep:
     """The points of a sweep in order of ring and azimuth."""
-    turn = ((sweep.azimuth_rad + np.pi) / (2.0 * np.pi) * AZIMUTH_STEPS).astype(np.int64)
-    row = np.argsort(sweep.ring * (AZIMUTH_STEPS + 1) + turn, kind="stable")
+    row = _order(sweep.ring, sweep.azimuth_rad)
     ring, azimuth_rad = sweep.ring[row], sweep.azimuth_rad[row]
     sampled = np.arange(0, len(row) - 1, STEP_SAMPLED_EVERY)
     step = azimuth_rad[sampled + 1] - azimuth_rad[sampled]
@@ -74,6 +75,35 @@ def ordered_sweep(sweep: Sweep, height_m: Floats) -> OrderedSweep:
         point_m=sweep.point_m[row],
         step_rad=float(np.median(step)) if len(step) else 2.0 * np.pi,
     )
+
+
+@compiled
+def _order(ring: Ints, azimuth_rad: Floats) -> Ints:
+    """Rows (n,) by ring, then by azimuth in steps, then as they were: two passes of a radix sort by azimuth's digits,
+    one by ring."""
+    size = len(ring)
+    turn = np.empty(size, np.int64)
+    for number in range(size):
+        turn[number] = int((azimuth_rad[number] + np.pi) / (2.0 * np.pi) * AZIMUTH_STEPS)
+    row = np.arange(size)
+    for shift in (0, DIGIT_BITS):
+        row = _counted(row, (turn >> shift) & (DIGITS - 1), DIGITS)
+    return _counted(row, ring, ring.max() + 1)
+
+
+@compiled
+def _counted(row: Ints, digit: Ints, digits: int) -> Ints:
+    """Rows (n,) in the order of their digits (by row), of equals as they were."""
+    begin = np.zeros(digits + 1, np.int64)
+    for number in range(len(digit)):
+        begin[digit[number] + 1] += 1
+    for number in range(digits):
+        begin[number + 1] += begin[number]
+    ordered = np.empty_like(row)
+    for number in row:
+        ordered[begin[digit[number]]] = number
+        begin[digit[number]] += 1
+    return ordered
 
 
 def segments_of(ordered: OrderedSweep, *, depth_step_m: float) -> Segments:
