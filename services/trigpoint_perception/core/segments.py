@@ -111,9 +111,11 @@ def segments_of(ordered: OrderedSweep, *, depth_step_m: float) -> Segments:
     first, count, left, right = _cut(
         ordered.ring_begin, ordered.azimuth_rad, ordered.run_m, ordered.step_rad, depth_step_m
     )
-    seen = np.column_stack([ordered.azimuth_rad, ordered.run_m, ordered.height_m, ordered.point_m])
+    begin = ordered.ring_begin[ordered.ring[first]]
+    size = ordered.ring_begin[ordered.ring[first] + 1] - begin
+    rows = np.column_stack([first - begin, count, begin, size])
     azimuth_rad, width_m, near_m, mean_m, mean_height_m = _measured(
-        first, count, ordered.ring_begin, ordered.ring, seen
+        rows, ordered.azimuth_rad, ordered.run_m, ordered.height_m, ordered.point_m
     )
     return Segments(
         first=first,
@@ -160,8 +162,10 @@ def _cuts(azimuth_rad: Floats, run_m: Floats, step_rad: float, depth_step_m: flo
     if size < 2:
         return cut, gap
     for here in range(size):
-        there = (here + 1) % size
-        turn = (azimuth_rad[there] - azimuth_rad[here]) % (2.0 * np.pi)
+        there = here + 1 if here + 1 < size else 0
+        turn = azimuth_rad[there] - azimuth_rad[here]
+        if turn < 0.0:
+            turn += 2.0 * np.pi
         gap[here] = turn > GAP_STEPS * step_rad
         allowed = depth_step_m + 2.0 * turn * min(run_m[here], run_m[there])
         cut[here] = gap[here] or abs(run_m[there] - run_m[here]) > allowed
@@ -170,22 +174,24 @@ def _cuts(azimuth_rad: Floats, run_m: Floats, step_rad: float, depth_step_m: flo
 
 @compiled
 def _measured(
-    first: Ints, count: Ints, ring_begin: Ints, ring: Ints, seen: Floats
+    rows: Ints, azimuth_rad: Floats, run_m: Floats, height_m: Floats, point_m: Floats
 ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Middle azimuths, widths, nearest distances, means (m, 3) and mean heights; seen (n, 6): azimuth, run, height,
-    x, y, z."""
-    size = len(first)
-    middle, width, near = np.empty(size), np.empty(size), np.full(size, np.inf)
-    mean = np.zeros((size, 4))
-    for number in range(size):
-        begin, end = ring_begin[ring[first[number]]], ring_begin[ring[first[number]] + 1]
-        for step in range(count[number]):
-            row = begin + (first[number] - begin + step) % (end - begin)
-            near[number] = min(near[number], seen[row, 1])
-            mean[number] += seen[row, 2:]
-        last = begin + (first[number] - begin + count[number] - 1) % (end - begin)
-        turn = (seen[last, 0] - seen[first[number], 0]) % (2.0 * np.pi)
-        middle[number] = seen[first[number], 0] + 0.5 * turn
+    """Middle azimuths, widths, nearest distances, means (m, 3) and mean heights; rows (m, 4): first point in its ring,
+    count, where its ring begins, the ring's size."""
+    total = len(rows)
+    middle, width, near = np.empty(total), np.empty(total), np.full(total, np.inf)
+    mean, height = np.zeros((total, 3)), np.zeros(total)
+    for number in range(total):
+        first, count, begin, size = rows[number]
+        for step in range(first, first + count):
+            row = begin + (step if step < size else step - size)
+            near[number] = min(near[number], run_m[row])
+            height[number] += height_m[row]
+            for axis in range(3):
+                mean[number, axis] += point_m[row, axis]
+        turn = (azimuth_rad[row] - azimuth_rad[begin + first]) % (2.0 * np.pi)
+        middle[number] = azimuth_rad[begin + first] + 0.5 * turn
         width[number] = turn * near[number]
-        mean[number] /= count[number]
-    return middle, width, near, mean[:, 1:], mean[:, 0]
+        height[number] /= count
+        mean[number] /= count
+    return middle, width, near, mean, height
