@@ -8,7 +8,7 @@ class SweepSettings:
     """Which sweeps and points are taken; lengths in metres from the sensor, except for the mount's from the base."""
 
     range_min_m: float = 1.0  # nearer is the vehicle itself
-    range_max_m: float = 60.0
+    range_max_m: float = 100.0  # what is far holds a match along a street better than much that is near
     points_min: int = 50
     points_max: int = 1_000_000  # of one sweep: four times the largest sensor's
     mount_limit_m: float = 10.0  # the longest vehicles carry no sensor farther from their base
@@ -49,7 +49,7 @@ class PoleSettings:
 class WallSettings:
     """What is a wall: straight, upright, higher than cars."""
 
-    cell_m: float = 0.25
+    cell_m: float = 0.5
     top_min_m: float = 1.9
     extent_min_m: float = 1.0
     split_m: float = 0.12  # from the line, of a point that begins another line
@@ -60,7 +60,7 @@ class WallSettings:
     angle_min_rad: float = 1.05  # between two walls at a corner: 60 degrees
     reach_m: float = 0.5  # from a wall's end to the corner
     systematic_sigma_m: float = 0.03
-    range_max_m: float = 40.0
+    range_max_m: float = 100.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,10 +77,10 @@ class TrackSettings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometrySettings:
-    """How sweeps are matched; tuned on KITTI 0005."""
+    """How sweeps are matched; tuned on KITTI 0005 and on streets of the simulated campus."""
 
     voxel_m: float = 1.0
-    downsampled_m: float = 0.5
+    downsampled_m: float = 0.75
     reach_m: float = 1.0  # between a point and its partner
     share_min: float = 0.3  # of points with a partner
     sigma_max_m: float = 0.5  # along the loosest direction

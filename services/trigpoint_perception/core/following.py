@@ -51,11 +51,13 @@ class _Waiting:
 
 @dataclass(frozen=True, slots=True)
 class _Placed:
-    """The last sweep that was matched."""
+    """The last sweep that was matched, and where the base was at the middle of its points' times (4, 4)."""
 
     sequence: int
     stamp_ns: int
     match: Match
+    middle_ns: int
+    T_odom_middle: Floats
 
 
 class SweepFollower:
@@ -110,10 +112,11 @@ class SweepFollower:
         """One sweep searched, matched and tracked. Raises EventRejected where it is not usable."""
         sweep = self._still(usable_sweep(numbered.scanned, self._settings.sweep), numbered.stamp_ns)
         sights = sights_of(sweep, self._settings)
-        match = self._odometry.matched(sweep.point_m, self._expected(numbered.stamp_ns))
+        placed = self._placed(
+            numbered, sweep, self._odometry.matched(sweep.point_m, self._expected(numbered.stamp_ns))
+        )
+        match = placed.match
         odometry = self._odometry_event(numbered, match)
-        placed = _Placed(numbered.sequence, numbered.stamp_ns, match)
-        self._remember_velocity(placed)
         self._last = placed
         self._tracks, numbers = followed(
             self._tracks,
@@ -152,18 +155,35 @@ class SweepFollower:
             motion = np.eye(4)
             motion[:3, :3] = rotation[0].T @ rotation[1]
             motion[:3, 3] = rotation[0].T @ (position_m[1] - position_m[0])
-        elif self._velocity is not None:
-            motion = expected_motion(self._velocity, (stamp_ns - last.stamp_ns) / NS_PER_S)
         else:
-            motion = np.eye(4)
+            motion = self._motion((stamp_ns - last.stamp_ns) / NS_PER_S)
         expected: Floats = last.match.T_odom_base @ motion
         return expected
 
-    def _remember_velocity(self, placed: _Placed) -> None:
-        if self._last is None or placed.match.refusal:
-            return
-        motion = np.linalg.inv(self._last.match.T_odom_base) @ placed.match.T_odom_base
-        self._velocity = velocity_of(motion, (placed.stamp_ns - self._last.stamp_ns) / NS_PER_S)
+    def _placed(self, numbered: NumberedSweep, sweep: Sweep, match: Match) -> _Placed:
+        """Where the base was, and the velocity it had by then.
+
+        Where no wheels say how it moved during the sweep, what is sure is its place at the middle of the points'
+        times: a wrong velocity moves the points before it as far as those after. Velocity is taken between middles and
+        carries the place back to the stamp; taken between stamps, an error would come back in the next one, larger.
+        """
+        stamp_ns, last = numbered.stamp_ns, self._last
+        if match.refusal or self._is_covered(sweep, stamp_ns):
+            middle_ns, T_odom_middle = stamp_ns, match.T_odom_base
+        else:
+            middle_ns = stamp_ns + int(sweep.offset_ns.mean())
+            T_odom_middle = match.T_odom_base @ self._motion((middle_ns - stamp_ns) / NS_PER_S)
+        if last is not None and not match.refusal and middle_ns > last.middle_ns:
+            motion = np.linalg.inv(last.T_odom_middle) @ T_odom_middle
+            self._velocity = velocity_of(motion, (middle_ns - last.middle_ns) / NS_PER_S)
+            if middle_ns != stamp_ns:
+                at_stamp = T_odom_middle @ self._motion((stamp_ns - middle_ns) / NS_PER_S)
+                match = replace(match, T_odom_base=at_stamp)
+        return _Placed(numbered.sequence, stamp_ns, match, middle_ns, T_odom_middle)
+
+    def _motion(self, dt_s: float) -> Floats:
+        """The motion (4, 4) over so long at the velocity last known; none where none is."""
+        return np.eye(4) if self._velocity is None else expected_motion(self._velocity, dt_s)
 
     def _odometry_event(self, numbered: NumberedSweep, match: Match) -> OdometryMatched | None:
         last = self._last

@@ -26,8 +26,7 @@ def heights_above_ground(sweep: Sweep, settings: GroundSettings, *, range_max_m:
     sector = ((sweep.azimuth_rad + np.pi) / (2.0 * np.pi) * settings.sectors).astype(np.int64) % settings.sectors
     lowest = _lowest(z_m, sweep.run_m, sector, (settings.sectors, bins), settings.bin_m)
     profile = _profiles(lowest, settings.bin_m, settings.slope_max, settings.step_m)
-    turned = [np.roll(profile, shift, axis=0) for shift in range(-SMOOTHED_SECTORS, SMOOTHED_SECTORS + 1)]
-    return _heights(z_m, sweep.run_m, sector, np.median(turned, axis=0), settings.bin_m)
+    return _heights(z_m, sweep.run_m, sector, _smoothed(profile), settings.bin_m)
 
 
 @compiled
@@ -60,6 +59,24 @@ def _profiles(lowest: Floats, bin_m: float, slope_max: float, step_m: float) -> 
             last = number
         ground[sector, last + 1 :] = height
     return ground
+
+
+@compiled
+def _smoothed(profile: Floats) -> Floats:
+    """The median (sectors, bins) of each sector's height and its neighbours' round the turn."""
+    sectors, bins = profile.shape
+    smooth = np.empty_like(profile)
+    near = np.empty(2 * SMOOTHED_SECTORS + 1)
+    for sector in range(sectors):
+        for number in range(bins):
+            for at in range(len(near)):
+                value, place = profile[(sector + at - SMOOTHED_SECTORS) % sectors, number], at
+                while place > 0 and near[place - 1] > value:
+                    near[place] = near[place - 1]
+                    place -= 1
+                near[place] = value
+            smooth[sector, number] = near[SMOOTHED_SECTORS]
+    return smooth
 
 
 @compiled

@@ -5,9 +5,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from trigpoint.compiled import compiled
 from trigpoint_perception.core.circle import Arc, Circle, fitted_circle
@@ -24,12 +21,15 @@ AXIS_HEIGHT_M = 3.0  # the axis is fitted to what stands lower, where there is e
 OUTLIER_M = 0.2  # of a ring's centre from the axis: another object
 CROWN_REACH_M = 1.5
 CROWN_FROM_M = 0.3  # above the top of what was taken for the trunk, or as near beside it
+CROWN_HEIGHT_MIN_M = 1.8
+CROWN_GAP_M = 0.25  # between the trunk's surface and what hangs about it
 CROWN_SHARE = 1.5  # points of the crown for each of the trunk
 TRUNK_RADIUS_M = 0.17  # thicker than any lamp post
 PANEL_WIDTH_M = (0.25, 1.3)
 PANEL_HEIGHT_M = (1.2, 4.5)
 PANEL_RATIO = 2.0  # times the pole's own width
 PANEL_RINGS = 2
+PANEL_REACH_M = 0.4  # from the pole's axis to the panel's middle
 PERSON_RADIUS_M = 0.08
 PERSON_TOP_M = 2.1
 PERSON_CLEAR_M = 0.3  # seen to be free above
@@ -89,13 +89,39 @@ def _segment_centres(segments: Segments, thin: Ints, sensor_m: Floats) -> Floats
 
 def _stacks(centre_m: Floats, settings: PoleSettings) -> list[Ints]:
     """Rows of segments that are linked by nearness, in groups of enough rings."""
-    pairs = cKDTree(centre_m).query_pairs(settings.link_m, output_type="ndarray")
-    size = len(centre_m)
-    graph = coo_matrix((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
-    _, label = connected_components(graph, directed=False)
-    order = np.argsort(label, kind="stable")
-    groups = np.split(order, np.nonzero(np.diff(label[order]))[0] + 1)
-    return [rows for rows in groups if len(rows) >= settings.rings_min]
+    label = _linked(centre_m, np.argsort(centre_m[:, 0], kind="stable"), settings.link_m)
+    size = np.bincount(label, minlength=len(label))
+    rows = np.nonzero(size[label] >= settings.rings_min)[0]
+    rows = rows[np.argsort(label[rows], kind="stable")]
+    return np.split(rows, np.nonzero(np.diff(label[rows]))[0] + 1) if len(rows) else []
+
+
+@compiled
+def _linked(centre_m: Floats, by_x: Ints, link_m: float) -> Ints:
+    """The group (m,) of each centre, named by the first in it: all that a chain of steps as short connects (a sweep
+    along x over disjoint sets)."""
+    group = np.arange(len(centre_m))
+    for at in range(len(by_x)):
+        one = by_x[at]
+        for after in range(at + 1, len(by_x)):
+            other = by_x[after]
+            if centre_m[other, 0] - centre_m[one, 0] > link_m:
+                break
+            apart_m = np.hypot(centre_m[other, 0] - centre_m[one, 0], centre_m[other, 1] - centre_m[one, 1])
+            if apart_m <= link_m:
+                first, second = _root(group, one), _root(group, other)
+                group[max(first, second)] = min(first, second)
+    for row in range(len(group)):
+        group[row] = _root(group, row)
+    return group
+
+
+@compiled
+def _root(group: Ints, row: int) -> int:
+    while group[row] != row:
+        group[row] = group[group[row]]
+        row = group[row]
+    return row
 
 
 def _slope_top(ordered: OrderedSweep, sensor_m: Floats) -> float:
@@ -182,21 +208,34 @@ class _Scene:
         return beside > FLANK_SHARE * points
 
     def _class_of(self, circle: Circle, top_m: float, points: int) -> PoleClass:
-        away_m = np.linalg.norm(self.segments.mean_m[:, :2] - circle.centre_m, axis=1)
-        height_m, width_m = self.segments.mean_height_m, self.segments.width_m
-        panel = (
-            (away_m < 0.4)
-            & (width_m >= max(PANEL_WIDTH_M[0], 2.0 * PANEL_RATIO * circle.radius_m))
-            & (width_m <= PANEL_WIDTH_M[1])
-            & (height_m >= PANEL_HEIGHT_M[0])
-            & (height_m <= PANEL_HEIGHT_M[1])
-        )
-        crown = (
-            (away_m < CROWN_REACH_M) & (height_m > max(top_m - CROWN_FROM_M, 1.8)) & (away_m > circle.radius_m + 0.25)
-        )
-        if self.segments.count[crown].sum() >= CROWN_SHARE * points or circle.radius_m > TRUNK_RADIUS_M:
+        around = self.segments.mean_m, self.segments.mean_height_m, self.segments.width_m, self.segments.count
+        crown, panels = _surroundings(*around, circle.centre_m, np.array([circle.radius_m, top_m]))
+        if crown >= CROWN_SHARE * points or circle.radius_m > TRUNK_RADIUS_M:
             return "trunk"
-        return "sign" if np.count_nonzero(panel) >= PANEL_RINGS else "pole"
+        return "sign" if panels >= PANEL_RINGS else "pole"
+
+
+@compiled
+def _surroundings(
+    mean_m: Floats, height_m: Floats, width_m: Floats, count: Ints, centre_m: Floats, size_m: Floats
+) -> tuple[int, int]:
+    """The points of a crown about a pole and the rings of a panel on it, by the segments (m,) of the sweep; size_m
+    (2,): the pole's radius and top."""
+    radius, top = size_m
+    panel_width = max(PANEL_WIDTH_M[0], 2.0 * PANEL_RATIO * radius)
+    crown_from = max(top - CROWN_FROM_M, CROWN_HEIGHT_MIN_M)
+    crown, panels = 0, 0
+    for row in range(len(count)):
+        x, y = mean_m[row, 0] - centre_m[0], mean_m[row, 1] - centre_m[1]
+        if abs(x) > CROWN_REACH_M or abs(y) > CROWN_REACH_M:
+            continue
+        away, height, width = np.hypot(x, y), height_m[row], width_m[row]
+        if radius + CROWN_GAP_M < away < CROWN_REACH_M and height > crown_from:
+            crown += count[row]
+        on_panel = away < PANEL_REACH_M and panel_width <= width <= PANEL_WIDTH_M[1]
+        if on_panel and PANEL_HEIGHT_M[0] <= height <= PANEL_HEIGHT_M[1]:
+            panels += 1
+    return crown, panels
 
 
 @compiled

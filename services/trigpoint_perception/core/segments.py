@@ -14,7 +14,9 @@ Bools = NDArray[np.bool_]
 
 GAP_STEPS = 3.5  # azimuth steps without a return between two points: nothing connects them
 STEP_SAMPLED_EVERY = 7  # points: enough to know the step between neighbours
-AZIMUTH_STEPS = 1 << 20  # of a full turn: finer than any sensor's encoder
+DIGIT_BITS = 11
+DIGITS = 1 << DIGIT_BITS
+AZIMUTH_STEPS = DIGITS * DIGITS - 1  # of a full turn: finer than any sensor's encoder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,8 +60,7 @@ class Segments:
 
 def ordered_sweep(sweep: Sweep, height_m: Floats) -> OrderedSweep:
     """The points of a sweep in order of ring and azimuth."""
-    turn = ((sweep.azimuth_rad + np.pi) / (2.0 * np.pi) * AZIMUTH_STEPS).astype(np.int64)
-    row = np.argsort(sweep.ring * (AZIMUTH_STEPS + 1) + turn, kind="stable")
+    row = _order(sweep.ring, sweep.azimuth_rad)
     ring, azimuth_rad = sweep.ring[row], sweep.azimuth_rad[row]
     sampled = np.arange(0, len(row) - 1, STEP_SAMPLED_EVERY)
     step = azimuth_rad[sampled + 1] - azimuth_rad[sampled]
@@ -76,14 +77,45 @@ def ordered_sweep(sweep: Sweep, height_m: Floats) -> OrderedSweep:
     )
 
 
+@compiled
+def _order(ring: Ints, azimuth_rad: Floats) -> Ints:
+    """Rows (n,) by ring, then by azimuth in steps, then as they were: two passes of a radix sort by azimuth's digits,
+    one by ring."""
+    size = len(ring)
+    turn = np.empty(size, np.int64)
+    for number in range(size):
+        turn[number] = int((azimuth_rad[number] + np.pi) / (2.0 * np.pi) * AZIMUTH_STEPS)
+    row = np.arange(size)
+    for shift in (0, DIGIT_BITS):
+        row = _counted(row, (turn >> shift) & (DIGITS - 1), DIGITS)
+    return _counted(row, ring, ring.max() + 1)
+
+
+@compiled
+def _counted(row: Ints, digit: Ints, digits: int) -> Ints:
+    """Rows (n,) in the order of their digits (by row), of equals as they were."""
+    begin = np.zeros(digits + 1, np.int64)
+    for number in range(len(digit)):
+        begin[digit[number] + 1] += 1
+    for number in range(digits):
+        begin[number + 1] += begin[number]
+    ordered = np.empty_like(row)
+    for number in row:
+        ordered[begin[digit[number]]] = number
+        begin[digit[number]] += 1
+    return ordered
+
+
 def segments_of(ordered: OrderedSweep, *, depth_step_m: float) -> Segments:
     """Each ring cut wherever neighbours differ by a step in depth or by missing returns."""
     first, count, left, right = _cut(
         ordered.ring_begin, ordered.azimuth_rad, ordered.run_m, ordered.step_rad, depth_step_m
     )
-    seen = np.column_stack([ordered.azimuth_rad, ordered.run_m, ordered.height_m, ordered.point_m])
+    begin = ordered.ring_begin[ordered.ring[first]]
+    size = ordered.ring_begin[ordered.ring[first] + 1] - begin
+    rows = np.column_stack([first - begin, count, begin, size])
     azimuth_rad, width_m, near_m, mean_m, mean_height_m = _measured(
-        first, count, ordered.ring_begin, ordered.ring, seen
+        rows, ordered.azimuth_rad, ordered.run_m, ordered.height_m, ordered.point_m
     )
     return Segments(
         first=first,
@@ -130,8 +162,10 @@ def _cuts(azimuth_rad: Floats, run_m: Floats, step_rad: float, depth_step_m: flo
     if size < 2:
         return cut, gap
     for here in range(size):
-        there = (here + 1) % size
-        turn = (azimuth_rad[there] - azimuth_rad[here]) % (2.0 * np.pi)
+        there = here + 1 if here + 1 < size else 0
+        turn = azimuth_rad[there] - azimuth_rad[here]
+        if turn < 0.0:
+            turn += 2.0 * np.pi
         gap[here] = turn > GAP_STEPS * step_rad
         allowed = depth_step_m + 2.0 * turn * min(run_m[here], run_m[there])
         cut[here] = gap[here] or abs(run_m[there] - run_m[here]) > allowed
@@ -140,22 +174,24 @@ def _cuts(azimuth_rad: Floats, run_m: Floats, step_rad: float, depth_step_m: flo
 
 @compiled
 def _measured(
-    first: Ints, count: Ints, ring_begin: Ints, ring: Ints, seen: Floats
+    rows: Ints, azimuth_rad: Floats, run_m: Floats, height_m: Floats, point_m: Floats
 ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Middle azimuths, widths, nearest distances, means (m, 3) and mean heights; seen (n, 6): azimuth, run, height,
-    x, y, z."""
-    size = len(first)
-    middle, width, near = np.empty(size), np.empty(size), np.full(size, np.inf)
-    mean = np.zeros((size, 4))
-    for number in range(size):
-        begin, end = ring_begin[ring[first[number]]], ring_begin[ring[first[number]] + 1]
-        for step in range(count[number]):
-            row = begin + (first[number] - begin + step) % (end - begin)
-            near[number] = min(near[number], seen[row, 1])
-            mean[number] += seen[row, 2:]
-        last = begin + (first[number] - begin + count[number] - 1) % (end - begin)
-        turn = (seen[last, 0] - seen[first[number], 0]) % (2.0 * np.pi)
-        middle[number] = seen[first[number], 0] + 0.5 * turn
+    """Middle azimuths, widths, nearest distances, means (m, 3) and mean heights; rows (m, 4): first point in its ring,
+    count, where its ring begins, the ring's size."""
+    total = len(rows)
+    middle, width, near = np.empty(total), np.empty(total), np.full(total, np.inf)
+    mean, height = np.zeros((total, 3)), np.zeros(total)
+    for number in range(total):
+        first, count, begin, size = rows[number]
+        for step in range(first, first + count):
+            row = begin + (step if step < size else step - size)
+            near[number] = min(near[number], run_m[row])
+            height[number] += height_m[row]
+            for axis in range(3):
+                mean[number, axis] += point_m[row, axis]
+        turn = (azimuth_rad[row] - azimuth_rad[begin + first]) % (2.0 * np.pi)
+        middle[number] = azimuth_rad[begin + first] + 0.5 * turn
         width[number] = turn * near[number]
-        mean[number] /= count[number]
-    return middle, width, near, mean[:, 1:], mean[:, 0]
+        height[number] /= count
+        mean[number] /= count
+    return middle, width, near, mean, height

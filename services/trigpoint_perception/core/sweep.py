@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from trigpoint.compiled import compiled
 from trigpoint.errors import EventRejected
 from trigpoint.events.scanned import PointsScanned
 from trigpoint_perception.settings import SweepSettings
@@ -58,27 +59,46 @@ def usable_sweep(scanned: PointsScanned, settings: SweepSettings) -> Sweep:
     count = len(scanned.point_m)
     _check_count(count, settings)
     rotation = _checked_rotation(scanned, settings)
-    point_m = np.asarray(scanned.point_m, dtype=np.float64)
-    range_m = np.sqrt(np.einsum("ij,ij->i", point_m, point_m))
-    usable = (range_m >= settings.range_min_m) & (range_m <= settings.range_max_m)  # NaN is neither
-    kept = int(usable.sum())
-    if kept < settings.points_min:
+    limits_m = np.array([settings.range_min_m, settings.range_max_m])
+    taken = _taken(np.array(scanned.point_m, dtype=np.float64), rotation, limits_m)
+    row, own_m, direction_m, azimuth_rad, run_m = taken
+    if len(row) < settings.points_min:
         raise EventRejected(
             "no usable points",
-            f"{kept} of {count} points are finite and within {settings.range_min_m:g} to {settings.range_max_m:g} m: "
-            f"at least {settings.points_min} are needed",
+            f"{len(row)} of {count} points are finite and within {settings.range_min_m:g} to "
+            f"{settings.range_max_m:g} m: at least {settings.points_min} are needed",
         )
-    own_m = point_m[usable]
-    direction_m = own_m @ rotation.T
     return Sweep(
         point_m=direction_m + scanned.sensor_position_m,
-        azimuth_rad=np.arctan2(direction_m[:, 1], direction_m[:, 0]),
-        run_m=np.hypot(direction_m[:, 0], direction_m[:, 1]),
-        offset_ns=scanned.offset_ns[usable].astype(np.int64),
-        ring=_rings_by_elevation(own_m, scanned.ring[usable]),
+        azimuth_rad=azimuth_rad,
+        run_m=run_m,
+        offset_ns=scanned.offset_ns[row].astype(np.int64),
+        ring=_rings_by_elevation(own_m, scanned.ring[row]),
         sensor_m=np.asarray(scanned.sensor_position_m, dtype=np.float64),
-        dropped=count - kept,
+        dropped=count - len(row),
     )
+
+
+@compiled
+def _taken(point_m: Floats, rotation: Floats, limits_m: Floats) -> tuple[Ints, Floats, Floats, Floats, Floats]:
+    """The rows (m,) of points (n, 3) within range, themselves (m, 3), turned into the base's axes (m, 3), and their
+    azimuths and horizontal distances (m,)."""
+    size = len(point_m)
+    row, own, turned = np.empty(size, np.int64), np.empty((size, 3)), np.empty((size, 3))
+    azimuth, run = np.empty(size), np.empty(size)
+    least, most = limits_m[0] ** 2, limits_m[1] ** 2
+    kept = 0
+    for number in range(size):
+        x, y, z = point_m[number, 0], point_m[number, 1], point_m[number, 2]
+        if least <= x * x + y * y + z * z <= most:  # NaN is not
+            row[kept] = number
+            own[kept, 0], own[kept, 1], own[kept, 2] = x, y, z
+            for axis in range(3):
+                turned[kept, axis] = rotation[axis, 0] * x + rotation[axis, 1] * y + rotation[axis, 2] * z
+            azimuth[kept] = np.arctan2(turned[kept, 1], turned[kept, 0])
+            run[kept] = np.sqrt(turned[kept, 0] ** 2 + turned[kept, 1] ** 2)
+            kept += 1
+    return row[:kept], own[:kept], turned[:kept], azimuth[:kept], run[:kept]
 
 
 def _check_count(count: int, settings: SweepSettings) -> None:
@@ -111,13 +131,29 @@ def _rings_by_elevation(own_m: Floats, ring: NDArray[np.uint16]) -> Ints:
     if number.max() - number.min() + 1 < MIN_RINGS_BY_NUMBER:
         number = np.floor(_elevations_rad(own_m) / ELEVATION_STEP_RAD).astype(np.int64)
         return number - int(number.min())
-    rings = int(number.max()) + 1
-    count = np.bincount(number[::SAMPLED_EVERY], minlength=rings)
-    total_rad = np.bincount(number[::SAMPLED_EVERY], _elevations_rad(own_m[::SAMPLED_EVERY]), minlength=rings)
-    order = np.argsort(np.where(count > 0, total_rad / np.maximum(count, 1), np.inf), kind="stable")
-    rank = np.empty(len(order), dtype=np.int64)
-    rank[order] = np.arange(len(order))
-    return rank[number]
+    return _rank(_mean_rises(own_m, number, int(number.max()) + 1))[number]
+
+
+def _rank(value: Floats) -> Ints:
+    """The place (n,) of each value in their order."""
+    rank = np.empty(len(value), dtype=np.int64)
+    rank[np.argsort(value, kind="stable")] = np.arange(len(value))
+    return rank
+
+
+@compiled
+def _mean_rises(own_m: Floats, ring: Ints, rings: int) -> Floats:
+    """The mean rise per run (rings,) of each laser's points, infinite for one without points."""
+    count, total = np.zeros(rings), np.zeros(rings)
+    for row in range(0, len(ring), SAMPLED_EVERY):
+        run_m = np.sqrt(own_m[row, 0] ** 2 + own_m[row, 1] ** 2)
+        count[ring[row]] += 1.0
+        total[ring[row]] += own_m[row, 2] / max(run_m, 1e-9)
+    mean = np.full(rings, np.inf)
+    for number in range(rings):
+        if count[number] > 0.0:
+            mean[number] = total[number] / count[number]
+    return mean
 
 
 def _elevations_rad(own_m: Floats) -> Floats:

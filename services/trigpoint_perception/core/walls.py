@@ -182,8 +182,13 @@ def _summed(seen: Floats) -> Floats:
     total = np.zeros(SUMS)
     for number in range(len(seen)):
         x, y = seen[number, 0], seen[number, 1]
-        total[:6] += np.array([1.0, x, y, x * x, x * y, y * y])
+        total[1] += x
+        total[2] += y
+        total[3] += x * x
+        total[4] += x * y
+        total[5] += y * y
         total[6] = max(total[6], seen[number, 2])
+    total[0] = len(seen)
     total[7] = total[8] = seen[0, 3]
     return total
 
@@ -201,17 +206,19 @@ def _extent(seen: Floats, line: Line) -> tuple[float, float]:
 @compiled
 def _merged(sums: Floats, extents: Floats) -> tuple[Floats, Floats]:
     """Pieces on one line, near each other along it, as one; extents along the merged lines."""
-    walls, reach = np.empty_like(sums), np.empty_like(extents)
+    walls, reach, lines = np.empty_like(sums), np.empty_like(extents), np.empty((len(sums), 5))
     count = 0
     for piece in range(len(sums)):
+        line = _line(sums[piece])
         wall = 0
-        while wall < count and not _is_part(walls[wall], reach[wall], sums[piece], extents[piece]):
+        while wall < count and not _is_part(lines[wall], reach[wall], line, extents[piece]):
             wall += 1
         if wall == count:
             walls[count], reach[count] = sums[piece], extents[piece]
             count += 1
         else:
             _join(walls[wall], reach[wall], sums[piece], extents[piece])
+        lines[wall, 0], lines[wall, 1], lines[wall, 2], lines[wall, 3], lines[wall, 4] = _line(walls[wall])
     return walls[:count], reach[:count]
 
 
@@ -226,8 +233,9 @@ def _along(extent: Floats, line: Line, on: Line) -> tuple[float, float]:
 
 
 @compiled
-def _is_part(wall: Floats, reach: Floats, piece: Floats, extent: Floats) -> bool:
-    on, line = _line(wall), _line(piece)
+def _is_part(wall: Floats, reach: Floats, line: Line, extent: Floats) -> bool:
+    """Whether a piece on a line is part of a wall whose line (5,) is `wall`."""
+    on = wall[0], wall[1], wall[2], wall[3], wall[4]
     if abs(line[2] * on[3] - line[3] * on[2]) > np.sin(MERGE_ANGLE_RAD):
         return False
     if abs((line[0] - on[0]) * on[3] - (line[1] - on[1]) * on[2]) > MERGE_OFFSET_M:
