@@ -21,7 +21,7 @@ from trigpoint_cli.served import ServedService
 from trigpoint_cli.settings import Settings, configuration_options, configured_settings, secrets_of
 from trigpoint_cli.stopping import StopRequests, stop_requests
 
-SERVICES = ("ingest", "filtering", "optimisation", "landmarks", "answers", "http")
+SERVICES = ("ingest", "filtering", "perception", "optimisation", "landmarks", "answers", "http")
 LOOK_S = 0.2  # between two looks whether the service still works
 STUCK = 1  # exit status of a process that could not finish in time
 

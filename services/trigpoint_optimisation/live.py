@@ -41,6 +41,7 @@ from trigpoint.observability.metrics import Instruments
 from trigpoint_optimisation.app import SOURCE, STREAM, boot_id_of, envelopes, input_positions
 from trigpoint_optimisation.core.live_fleet import LiveFleet
 from trigpoint_optimisation.core.live_state import DriveName, DrivePlace
+from trigpoint_optimisation.live_perceived import PerceivedLandmarks
 from trigpoint_optimisation.resuming import Resumed, needed_of, resumed
 from trigpoint_optimisation.settings import SolveSettings, settings_json
 from trigpoint_optimisation.whole_solve import WholeSolve, WholeSolver
@@ -144,6 +145,7 @@ class LiveOptimisation:
         self._judged = StreamFollower(
             self._log, [VERDICT_STREAM], checkpoint={VERDICT_STREAM: state.verdict_number}, kinds=(FixJudged,)
         )
+        self._perceived = PerceivedLandmarks(self._log, first_number=state.perceived_number)
         self._corrected = StreamFollower(
             self._log, [LABEL_STREAM], checkpoint={LABEL_STREAM: self._log.next_number(LABEL_STREAM)}
         )
@@ -165,8 +167,9 @@ class LiveOptimisation:
     def _take(self) -> bool:
         """Whether anything was new; corrections of odometry are appended."""
         assert self._fleet is not None, "begun before"
+        perceived, found = self._perceived.take(self._fleet)
+        places = {(place.vehicle, place.boot_id): place for place in found}
         rows = self._measured.take(BATCH)
-        places: dict[DriveName, DrivePlace] = {}
         began_s = time.perf_counter()
         for row in rows:
             envelope = cast(Envelope[Observed], row.envelope)
@@ -181,11 +184,11 @@ class LiveOptimisation:
         self._correct(list(places.values()))
         if self._corrected.take(BATCH):
             self._correction_s = time.monotonic()
-        if rows or verdicts:
+        if rows or verdicts or perceived:
             self._news_s = time.monotonic()
         lag_events = self._measured.lag if rows else 0  # who found nothing new is not behind
         self._backlog.show(taken=sum(self._measured.checkpoint.values()), lag_events=lag_events)
-        return bool(rows or verdicts)
+        return bool(rows or verdicts or perceived)
 
     def _correct(self, places: Sequence[DrivePlace]) -> None:
         rows: list[Envelope[Event]] = []
@@ -233,9 +236,11 @@ class LiveOptimisation:
         return bool(changed)
 
     def _positions(self) -> tuple[tuple[str, int], ...]:
-        """How far each stream is taken in, by the version before or since; what perception finds waits for the next
-        whole solve."""
-        at = {PERCEIVED_STREAM: 0, **self._measured.checkpoint, **self._judged.checkpoint, **self._corrected.checkpoint}
+        """How far each stream is taken in, by the version before or since."""
+        followed = (self._measured, self._judged, self._corrected)
+        at = {PERCEIVED_STREAM: self._perceived.number}
+        for one in followed:
+            at.update(one.checkpoint)
         return tuple(
             (stream, max(at.get(stream, number), self._version_inputs.get(stream, 0)))
             for stream, number in input_positions(self._log)

@@ -9,6 +9,7 @@ from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.mapped import LandmarkSolved, Mapped, MapSolved, OdometryCorrected, TrajectorySolved
 from trigpoint.events.observed import VehicleDescribed
 from trigpoint.events.solved import closed_versions
+from trigpoint.logs.perceived_readings import PERCEIVED_STREAM
 from trigpoint.logs.ports import EventLog, LoggedEvent
 from trigpoint.logs.readings import VERDICT_STREAM, vehicle_streams
 from trigpoint_optimisation.app import STREAM
@@ -35,15 +36,17 @@ class Resumed:
     said_ns: Mapping[DriveName, int] = field(default_factory=dict)
     vehicle_numbers: Mapping[str, int] = field(default_factory=dict)
     verdict_number: int = 0
+    perceived_number: int = 0
 
 
 def resumed(log: EventLog) -> Resumed:
     """What the log says of it."""
     begun = {stream: _newest_boot(log, stream) for stream in vehicle_streams(log)}
     vehicle_numbers = {stream: number for stream, (number, _) in begun.items()}
+    perceived_number = _first_perceived(log, {(stream, boot_id) for stream, (_, boot_id) in begun.items()})
     newest, whole, first_number = _heads(log)
     if newest is None or whole is None:
-        return Resumed(vehicle_numbers=vehicle_numbers)
+        return Resumed(vehicle_numbers=vehicle_numbers, perceived_number=perceived_number)
     stamp_ns, head = newest.envelope.stamp_ns, cast(MapSolved, newest.envelope.event)
     before = cast(MapSolved, whole.envelope.event)
     landmarks, paths = _parts(log, first_number)
@@ -63,6 +66,7 @@ def resumed(log: EventLog) -> Resumed:
         said_ns={name: said_ns for name, (said_ns, _) in said.items()},
         vehicle_numbers=vehicle_numbers,
         verdict_number=dict(head.inputs).get(VERDICT_STREAM, 0),
+        perceived_number=perceived_number,
     )
 
 
@@ -117,6 +121,15 @@ def _corrections(log: EventLog) -> dict[DriveName, tuple[int, OdometryCorrected]
         event = cast(OdometryCorrected, row.envelope.event)
         newest[event.vehicle, event.boot_id] = row.envelope.stamp_ns, event
     return newest
+
+
+def _first_perceived(log: EventLog, boots: set[tuple[str, str]]) -> int:
+    """The number of the first event perception said of the time since one of the boots, by stream, began."""
+    starts = [boot.start_ns for stream, boot_id in boots for boot in log.boots(stream) if boot.boot_id == boot_id]
+    if not starts:
+        return 0
+    first = next(log.read(PERCEIVED_STREAM, from_ns=min(starts)), None)
+    return log.next_number(PERCEIVED_STREAM) if first is None else first.position.number
 
 
 def _newest_boot(log: EventLog, stream: str) -> tuple[int, str]:

@@ -2,7 +2,7 @@
 
 import logging
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import cast
@@ -10,30 +10,22 @@ from typing import cast
 from trigpoint.errors import ServiceError
 from trigpoint.events.codec import Event
 from trigpoint.events.corrected import excluded_drives
-from trigpoint.events.drives import drives_of
 from trigpoint.events.envelope import Envelope
 from trigpoint.events.keys import STREAM_PATTERNS
-from trigpoint.events.observed import (
-    ImuMeasured,
-    Observed,
-    VehicleDescribed,
-    WheelPairMeasured,
-    WheelSpeedMeasured,
-)
+from trigpoint.events.observed import Observed
 from trigpoint.events.perceived import LandmarksPerceived, Perceived
 from trigpoint.events.scanned import PointsScanned
 from trigpoint.logs.ports import EventLog
 from trigpoint.logs.readings import Progress, in_silence, logged_corrections, vehicle_streams
 from trigpoint.workers import Tally, Workers
-from trigpoint_perception.core.deskew import Path
-from trigpoint_perception.core.following import NumberedSweep, SweepFollower
-from trigpoint_perception.core.motion_prior import wheel_path
+from trigpoint_perception.core.drive_following import DriveFollower
+from trigpoint_perception.core.motion_window import MOTION_KINDS
 from trigpoint_perception.core.perceiving import CORNER, POLE
 from trigpoint_perception.core.publication import Said, numbered, output_boot_id
 from trigpoint_perception.settings import PerceptionSettings
 
 STREAM = STREAM_PATTERNS[LandmarksPerceived]
-MOTION_KINDS = (VehicleDescribed, WheelSpeedMeasured, WheelPairMeasured, ImuMeasured)
+KINDS = (PointsScanned, *MOTION_KINDS)
 APPENDED_TOGETHER = 200  # events
 
 logger = logging.getLogger(__name__)
@@ -41,13 +33,12 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScannedDrive:
-    """A drive with sweeps: where they are, how many, and the base's path by its wheels, where there is one."""
+    """A drive with sweeps: where they are, and how many."""
 
     stream: str
     vehicle: str
     boot_id: str
     sweeps: int
-    wheels: Path | None
 
     @property
     def name(self) -> tuple[str, str]:
@@ -127,18 +118,21 @@ def _in_silence(count: int) -> None:
 def scanned_drives(log: EventLog) -> tuple[ScannedDrive, ...]:
     """The drives with sweeps that are not excluded; no sweep is decoded for it."""
     excluded = excluded_drives(logged_corrections(log))
-    drives: list[ScannedDrive] = []
+    return tuple(
+        ScannedDrive(stream=stream, vehicle=name[0], boot_id=name[1], sweeps=count)
+        for stream, counts in sweep_counts(log)
+        for name, count in counts.items()
+        if name not in excluded
+    )
+
+
+def sweep_counts(log: EventLog) -> Iterator[tuple[str, Mapping[tuple[str, str], int]]]:
+    """How many sweeps there are of each drive, in order of the drives' first ones, by the vehicles' streams."""
     for stream in vehicle_streams(log):
         counts: Counter[tuple[str, str]] = Counter()
         for logged in log.read_runs(stream, kinds=(PointsScanned,)):
             counts[logged.run.source, logged.run.boot_id] += len(logged.run)
-        wheels = _wheel_paths(log, stream) if counts else {}
-        drives += [
-            ScannedDrive(stream=stream, vehicle=name[0], boot_id=name[1], sweeps=count, wheels=wheels.get(name))
-            for name, count in counts.items()
-            if name not in excluded
-        ]
-    return tuple(drives)
+        yield stream, counts
 
 
 def said_of(log: EventLog) -> dict[str, Said]:
@@ -148,12 +142,6 @@ def said_of(log: EventLog) -> dict[str, Said]:
         event = cast(Perceived, logged.envelope.event)
         said.setdefault(logged.envelope.identity.boot_id, Said()).add(event)
     return said
-
-
-def _wheel_paths(log: EventLog, stream: str) -> dict[tuple[str, str], Path | None]:
-    """The path by wheels of each drive in a stream, by vehicle and boot."""
-    rows = (cast(Envelope[Observed], logged.envelope) for logged in log.read(stream, kinds=MOTION_KINDS))
-    return {(drive.vehicle, drive.boot_id): wheel_path(drive) for drive in drives_of(rows)}
 
 
 def _appended(
@@ -183,21 +171,16 @@ def _append(log: EventLog, told: Sequence[tuple[int, Perceived]], *, boot_id: st
 def _told(
     log: EventLog, drive: ScannedDrive, settings: PerceptionSettings, heard: Callable[[int], None]
 ) -> Iterator[tuple[int, Perceived]]:
-    """Every event of a drive, each sensor followed by itself."""
-    followers: dict[str, SweepFollower] = {}
-    for logged in log.read(drive.stream, kinds=(PointsScanned,)):
-        envelope = cast(Envelope[PointsScanned], logged.envelope)
+    """Every event of a drive, in the order of its sweeps."""
+    follower = DriveFollower(drive.vehicle, drive.boot_id, settings)
+    for logged in log.read(drive.stream, kinds=KINDS):
+        envelope = cast(Envelope[Observed], logged.envelope)
         if envelope.identity.boot_id != drive.boot_id:
             continue
-        follower = followers.get(envelope.event.sensor)
-        if follower is None:
-            follower = SweepFollower(drive.vehicle, drive.boot_id, settings, wheels=drive.wheels)
-            followers[envelope.event.sensor] = follower
-        sequence = envelope.identity.sequence
-        yield from follower.take(NumberedSweep(sequence=sequence, stamp_ns=envelope.stamp_ns, scanned=envelope.event))
-        heard(1)
-    for follower in followers.values():
-        yield from follower.finished()
+        yield from follower.take(envelope)
+        if isinstance(envelope.event, PointsScanned):
+            heard(1)
+    yield from follower.finished()
 
 
 def _report(drive: ScannedDrive, said: Said, *, appended: int) -> DriveReport:

@@ -18,10 +18,12 @@ from trigpoint.events.envelope import Envelope
 from trigpoint.events.perceived import LandmarksPerceived, PerceivedLandmark
 from trigpoint.events.scanned import PointsScanned
 from trigpoint.logs.mcap_log import McapLog
-from trigpoint_perception.app import STREAM, scanned_drives
+from trigpoint.logs.readings import logged_drives
+from trigpoint_perception.app import STREAM
 from trigpoint_perception.core.deskew import Path as BasePath
 from trigpoint_perception.core.deskew import deskewed, poses_at
 from trigpoint_perception.core.following import NumberedSweep, SweepFollower
+from trigpoint_perception.core.motion_prior import wheel_path
 from trigpoint_perception.core.odometry import LidarOdometry
 from trigpoint_perception.core.perceiving import sights_of
 from trigpoint_perception.core.sharpness import Sharpness, sharpness_of
@@ -120,9 +122,10 @@ def sharpness(log_path: Path, points: str, registered_by: str) -> Sharpness:
     """The map of the sweeps of one turn, above ground."""
     chosen = list(logged_sweeps(log_path))[MAPPED]
     with closing(McapLog(log_path)) as log:
-        (drive,) = scanned_drives(log)
-    assert drive.wheels is not None  # OXTS is said to be the wheels
-    placed = [_placed(sweep, points, drive.wheels) for sweep in chosen]
+        (drive,) = logged_drives(log)
+    wheels = wheel_path(drive)
+    assert wheels is not None  # OXTS is said to be the wheels
+    placed = [_placed(sweep, points, wheels) for sweep in chosen]
     stamp_ns = np.array([sweep.stamp_ns for sweep in chosen], dtype=np.int64)
     poses = _poses(drive.wheels, stamp_ns)
     if registered_by == BY_LIDAR:

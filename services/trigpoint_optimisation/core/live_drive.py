@@ -39,6 +39,9 @@ from trigpoint_optimisation.settings import CalibrationPriors, SolveSettings
 
 Floats = NDArray[np.float64]
 
+PERCEIVED_WAIT_NS = 3_000_000_000  # behind the newest measurement what perception finds is not waited for longer
+AHEAD_NS = 10_000_000_000  # of the newest measurement: what was perceived so far on is of another clock,
+AHEAD_SWEEPS = 500  # and more of it than this is not kept
 REORDER_NS = 200_000_000  # an event may arrive this much behind a later one and still be taken in order
 STANDING_NS = 1_000_000_000  # a standing vehicle has a keyframe after so long,
 STANDING_KEYFRAMES = 3  # and so many in a row: what it sees again and again says nothing new
@@ -95,7 +98,9 @@ class LiveDrive:
         self.tracks = OpenTracks(settings.detections)
         self._settings, self._scale = settings, point_scale
         self._waiting: list[tuple[int, int, Observed]] = []
-        self._newest_ns = 0
+        self._newest_ns = self._perceived_ns = self._released_ns = -1
+        self._perceived: list[tuple[int, int, Observed]] = []
+        self.passed_over = 0  # perceived sweeps that came too late or too early
         self._wheels: list[_Wheel] = []
         self._imu: list[tuple[int, float]] = []
         self._heard: list[tuple[int, int, GnssFixReceived | LandmarksDetected]] = []
@@ -108,11 +113,43 @@ class LiveDrive:
 
     def take(self, row: Envelope[Observed]) -> list[Leg]:
         """The legs that are whole now that one more event is here."""
-        heapq.heappush(self._waiting, (row.stamp_ns, row.identity.sequence, row.event))
+        event = row.event
+        if isinstance(event, LandmarksDetected) and self._perceived_ns >= 0:  # both saw the same things
+            event = LandmarksDetected(detections=tuple(one for one in event.detections if one.signature))
+        heapq.heappush(self._waiting, (row.stamp_ns, row.identity.sequence, event))
         self._newest_ns = max(self._newest_ns, row.stamp_ns)
+        return self._released()
+
+    def perceive(self, row: Envelope[LandmarksDetected]) -> list[Leg]:
+        """The same, of what was perceived in one more sweep, each once: from the first on, measurements wait for it.
+
+        What the vehicle itself detected without a signature then stands back; a camera does not.
+        """
+        if self.described.landmark_sensor_model == CAMERA:
+            return []
+        self._perceived_ns = max(self._perceived_ns, row.stamp_ns)
+        if row.stamp_ns <= self._released_ns or len(self._perceived) == AHEAD_SWEEPS:
+            self.passed_over += 1
+        else:
+            heapq.heappush(self._perceived, (row.stamp_ns, row.identity.sequence, row.event))
+        return self._released()
+
+    @property
+    def ahead(self) -> int:
+        """How many perceived sweeps wait for measurements that are soon to come."""
+        soon = bool(self._perceived) and self._perceived[0][0] <= self._newest_ns + AHEAD_NS
+        return len(self._perceived) if soon else 0
+
+    def _released(self) -> list[Leg]:
+        """The legs from what nothing can come before any more."""
+        until_ns = self._newest_ns - REORDER_NS
+        if self._perceived_ns >= 0:
+            until_ns = max(min(until_ns, self._perceived_ns), self._newest_ns - PERCEIVED_WAIT_NS)
+        self._released_ns = max(self._released_ns, until_ns)
         legs = []
-        while self._waiting and self._waiting[0][0] <= self._newest_ns - REORDER_NS:
-            legs += self._after(*heapq.heappop(self._waiting))
+        while due := [queue for queue in (self._waiting, self._perceived) if queue and queue[0][0] <= until_ns]:
+            first = min(due, key=lambda queue: queue[0][0])
+            legs += self._after(*heapq.heappop(first))
         return legs
 
     @property

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from trigpoint.events.envelope import Envelope
 from trigpoint.events.estimated import FixJudged
 from trigpoint.events.mapped import LandmarkSolved, OdometryCorrected, TrajectorySolved
-from trigpoint.events.observed import Observed, VehicleDescribed
+from trigpoint.events.observed import LandmarksDetected, Observed, VehicleDescribed
 from trigpoint.geodesy.poses import wrap_angle_rad
 from trigpoint.geodesy.projection import MapFrame
 from trigpoint_optimisation.core.live_drive import Leg, LiveDrive
@@ -80,14 +80,33 @@ class LiveFleet:
         """Where the drive came to, if the event brought it to a new keyframe and it has a place."""
         name = (row.identity.source, row.identity.boot_id)
         followed = self._followed.get(name) or self._begun(name, row.event)
+        return self._led(name, followed, followed.drive.take(row))
+
+    def _led(self, name: DriveName, followed: _Followed, legs: Sequence[Leg]) -> list[DrivePlace]:
         places = []
-        for leg in followed.drive.take(row):
+        for leg in legs:
             followed.legs.append(leg)
             followed.behind.append(leg)
             places += self._lead_on(name, followed)
             if not self.map.is_placed(name) and followed.start is None:
                 followed.legs = _still_needed(followed.legs, None)
         return places
+
+    def perceive(self, row: Envelope[LandmarksDetected]) -> list[DrivePlace]:
+        """The same as `take`, of what was perceived in a sweep of a drive that has begun."""
+        name = (row.identity.source, row.identity.boot_id)
+        followed = self._followed[name]
+        return self._led(name, followed, followed.drive.perceive(row))
+
+    def described(self, name: DriveName) -> VehicleDescribed | None:
+        """What a drive's vehicle is; None before its first event."""
+        followed = self._followed.get(name)
+        return None if followed is None else followed.drive.described
+
+    @property
+    def ahead(self) -> int:
+        """How many perceived sweeps wait for their drives' measurements."""
+        return sum(followed.drive.ahead for followed in self._followed.values())
 
     def catch_up(self) -> tuple[bool, list[DrivePlace]]:
         """A little of what waits, of one drive: whether anything did, and where the drive came to."""

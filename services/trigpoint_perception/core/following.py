@@ -74,6 +74,15 @@ class SweepFollower:
         self._number = 0  # of the sweep, refused ones too
         self.restarts = 0  # where the clock jumped or sweeps were missing
 
+    @property
+    def last_stamp_ns(self) -> int | None:
+        """The stamp of the last sweep that was matched, None before the first one and after a jump of the clock."""
+        return None if self._last is None else self._last.stamp_ns
+
+    def lead_by(self, wheels: Path | None) -> None:
+        """From now on the base moves by this path, None: as it moved before."""
+        self._wheels = wheels
+
     def take(self, numbered: NumberedSweep) -> tuple[tuple[int, Perceived], ...]:
         """Events with their stamps that are certain after one more sweep, those of earlier sweeps first."""
         restarted: tuple[tuple[int, Perceived], ...] = ()

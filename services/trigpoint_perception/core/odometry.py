@@ -7,13 +7,11 @@ import small_gicp
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from trigpoint_perception.core.kept_map import NEIGHBOURS, KeptMap
 from trigpoint_perception.settings import OdometrySettings
 
 Floats = NDArray[np.float64]
 
-KEPT_SWEEPS = 100  # a voxel not hit for so long is forgotten
-CLEARED_EVERY = 10
-NEIGHBOURS = 10  # for a point's own covariance
 ROTATION_STEP_RAD = 5e-4
 ITERATIONS_MAX = 20  # then points only change voxels to and fro, and the place by less than a millimetre
 PLANAR = np.ix_([3, 4, 2], [3, 4, 2])  # x, y, heading of a twist: rotation first, then translation
@@ -35,8 +33,7 @@ class LidarOdometry:
 
     def __init__(self, settings: OdometrySettings) -> None:
         self._settings = settings
-        self._map = small_gicp.GaussianVoxelMap(settings.voxel_m)
-        self._map.set_lru(KEPT_SWEEPS, CLEARED_EVERY)
+        self._map = KeptMap(settings.voxel_m)
         self._begun = False
 
     def matched(self, point_m: Floats, expected: Floats) -> Match:
@@ -48,7 +45,7 @@ class LidarOdometry:
             self._map.insert(cloud, expected)
             return Match(T_odom_base=expected, covariance=np.zeros((3, 3)), matched_share=1.0, refusal="")
         found = small_gicp.align(
-            self._map,
+            self._map.voxels,
             cloud,
             expected,
             max_correspondence_distance=settings.reach_m,

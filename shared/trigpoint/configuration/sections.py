@@ -85,6 +85,7 @@ class HttpSettings:
     landmarks_port: Port = 9465
     answers_port: Port = 9466
     http_port: Port = 9467
+    perception_port: Port = 9468
     parallel_limit: Annotated[int, Field(ge=1, le=256)] = 8
     request_timeout_s: Seconds = 5.0
 
@@ -106,6 +107,7 @@ class HttpSettings:
             "landmarks": self.landmarks_port,
             "answers": self.answers_port,
             "http": self.http_port,
+            "perception": self.perception_port,
         }
 
 
@@ -130,7 +132,7 @@ class TracingSettings:
             raise InputError(f"endpoint {self.endpoint!r}: begins with http:// or https://")
 
 
-ServiceName = Literal["router", "ingest", "filtering", "optimisation", "landmarks", "answers", "http"]
+ServiceName = Literal["router", "ingest", "filtering", "perception", "optimisation", "landmarks", "answers", "http"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

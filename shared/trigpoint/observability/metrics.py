@@ -49,6 +49,7 @@ class Instruments:
         self.map_version = self._gauge("map_version", "Newest map version known.")
         self.fsync_seconds = self._histogram("fsync_seconds", "Durations of making a group of events durable.")
         self.update_seconds = self._histogram("update_seconds", "Durations of incremental updates.")
+        self.sweep_seconds = self._histogram("sweep_seconds", "Durations of perceiving one sweep.")
         self.solve_seconds = self._histogram("solve_seconds", "Durations of whole solves.")
         self.answer_seconds = self._histogram("answer_seconds", "Durations of answering a question.")
         self.request_seconds = self._histogram("request_seconds", "Durations of HTTP requests.", "route")

@@ -1,0 +1,165 @@
+"""What perception finds comes later than what was measured, and goes into the growing map as what a sensor detected."""
+
+from collections.abc import Iterator, Sequence
+from functools import cache
+from typing import cast
+
+import numpy as np
+
+from solved_worlds.examples import FRAME, Lap, World, world
+from solved_worlds.logged import all_accepted, append_world, drive_rows
+from trigpoint.events.codec import Event
+from trigpoint.events.envelope import Envelope, EventIdentity
+from trigpoint.events.mapped import LandmarkSolved
+from trigpoint.events.observed import LandmarksDetected, Observed, VehicleDescribed
+from trigpoint.events.perceived import LandmarksPerceived
+from trigpoint.logs.memory_log import MemoryLog
+from trigpoint.logs.perceived_readings import PERCEIVED_STREAM
+from trigpoint_optimisation.core.live_drive import PERCEIVED_WAIT_NS, Leg, LiveDrive
+from trigpoint_optimisation.core.live_fleet import LiveFleet
+from trigpoint_optimisation.live_perceived import PerceivedLandmarks
+from trigpoint_optimisation.resuming import resumed
+from trigpoint_optimisation.settings import SolveSettings
+from unit.optimisation.test_perceived_landmarks import by_perception
+
+USUAL_NS = 700_000_000  # five sweeps and the work
+SETTINGS = SolveSettings()
+
+
+@cache
+def lap() -> World:
+    return world(Lap(duration_s=40.0))
+
+
+@cache
+def rows() -> tuple[Envelope[Observed], ...]:
+    return tuple(cast(list[Envelope[Observed]], drive_rows(lap().drives[0])))
+
+
+def is_sweep(row: Envelope[Observed]) -> bool:
+    return isinstance(row.event, LandmarksDetected)
+
+
+def drive() -> LiveDrive:
+    return LiveDrive(lap().drives[0].described, "boot", SETTINGS, point_scale=1.0)
+
+
+def with_perceived(late_ns: int) -> Iterator[Envelope[Observed]]:
+    """Measurements in their order, each sweep so much later than what was measured with it."""
+    due = sorted((row.stamp_ns + late_ns * is_sweep(row), row.identity.sequence, row) for row in rows())
+    return (row for _, _, row in due)
+
+
+def legs_of(follower: LiveDrive, late_ns: int) -> list[Leg]:
+    """The legs of a drive in whose sweeps perception found so late what is in them."""
+    legs = []
+    for row in with_perceived(late_ns):
+        legs += follower.perceive(cast(Envelope[LandmarksDetected], row)) if is_sweep(row) else follower.take(row)
+    return legs
+
+
+def seen_in(legs: Sequence[Leg]) -> dict[int, list[tuple[int, int]]]:
+    """By keyframe the track and number of detections of all that was seen from it."""
+    return {
+        leg.keyframe: [
+            (track.number, sum(seen.keyframe == leg.keyframe for seen in track.seen)) for track in leg.tracks
+        ]
+        for leg in legs
+    }
+
+
+def sightings(seen: list[tuple[int, int]]) -> list[int]:
+    return sorted(count for _, count in seen)
+
+
+def test_a_leg_waits_for_what_is_perceived_in_its_sweeps() -> None:
+    plain, follower = drive(), drive()
+    in_order = seen_in([leg for row in rows() for leg in plain.take(row)])
+    late = seen_in(legs_of(follower, USUAL_NS))
+    first = min(keyframe for keyframe, seen in late.items() if seen) + 1  # nothing waits before the first is here
+    both = [keyframe for keyframe in late if keyframe > first]
+    assert len(both) > 20
+    assert follower.passed_over <= 1 + USUAL_NS // 100_000_000
+    assert [sightings(late[keyframe]) for keyframe in both] == [sightings(in_order[keyframe]) for keyframe in both]
+
+
+def test_what_comes_much_later_is_passed_over_and_the_drive_goes_on() -> None:
+    plain, follower = drive(), drive()
+    whole = [leg for row in rows() for leg in plain.take(row)]
+    legs = legs_of(follower, PERCEIVED_WAIT_NS + USUAL_NS)
+    assert len(legs) >= len(whole) - 12  # of the last seconds, which still wait
+    until_ns = rows()[-1].stamp_ns - PERCEIVED_WAIT_NS  # nothing newer makes what comes then late
+    assert not any(leg.tracks for leg in legs if leg.end_ns < until_ns)
+    assert follower.passed_over == sum(is_sweep(row) and row.stamp_ns < until_ns for row in rows())
+
+
+def test_what_is_ahead_of_all_measurements_is_kept_up_to_a_bound() -> None:
+    follower = drive()
+    follower.take(rows()[0])
+    sweep = cast(Envelope[LandmarksDetected], next(row for row in rows() if is_sweep(row)))
+    for number in range(1000):
+        identity = EventIdentity("car", "boot", 10_000 + number)
+        follower.perceive(Envelope(identity, sweep.stamp_ns + 3_600_000_000_000 + number, sweep.event))
+    assert (follower.ahead, follower.passed_over) == (0, 500)
+
+
+def perceived_rows(boot_id: str = "perceived") -> list[Envelope[Event]]:
+    described = lap().drives[0].described
+    some = [by_perception(cast(Envelope[Event], row), described, 0) for row in rows() if is_sweep(row)]
+    return [
+        Envelope(EventIdentity("perception", boot_id, number), row.stamp_ns, row.event)
+        for number, row in enumerate(some)
+    ]
+
+
+def fleet_log(*boots: str) -> MemoryLog:
+    """The drive without a detection of its own, and what perception said of it, once for each of its boots."""
+    log = MemoryLog()
+    append_world(log, lap())
+    bare = MemoryLog()
+    for stream in log.streams():
+        kept = [row.envelope for row in log.read(stream) if not isinstance(row.envelope.event, LandmarksDetected)]
+        bare.append(stream, kept)
+    for boot_id in boots:
+        bare.append(PERCEIVED_STREAM, perceived_rows(boot_id))
+    return bare
+
+
+def grown(log: MemoryLog) -> list[LandmarkSolved]:
+    """The landmarks of a map grown from a log, by measurements and what was perceived, some of each at a time."""
+    fleet, perceived = LiveFleet(FRAME, SETTINGS), PerceivedLandmarks(log, first_number=0)
+    measured = [cast(Envelope[Observed], row.envelope) for row in log.read("veh-car")]
+    for first in range(0, len(measured), 500):
+        perceived.take(fleet)
+        for row in measured[first : first + 500]:
+            fleet.take(row)
+        for verdict in all_accepted(measured[first : first + 500]):
+            fleet.judged(verdict)
+    while fleet.catch_up()[0]:
+        pass
+    return fleet.map.changed_landmarks(share=0.1)
+
+
+def test_a_map_grows_from_what_was_perceived() -> None:
+    off = [np.hypot(*(lap().pole_m - one.position_m).T).min() for one in grown(fleet_log("one"))]
+    assert len(off) > 10
+    assert np.median(off) < 3.0  # the error of the fixes, common to all
+
+
+def test_what_was_perceived_by_other_settings_counts_once() -> None:
+    once, twice = (grown(fleet_log(*boots)) for boots in (("one",), ("one", "two")))
+    assert [one.observations for one in once] == [one.observations for one in twice]
+
+
+def test_after_a_restart_it_is_read_from_where_the_newest_boot_began() -> None:
+    log, later_ns = fleet_log("one"), 10**13
+    described = VehicleDescribed(vehicle="car")
+    log.append("veh-car", [Envelope(EventIdentity("car", "boot-2", 0), rows()[-1].stamp_ns + later_ns, described)])
+    before = log.next_number(PERCEIVED_STREAM)
+    assert resumed(log).perceived_number == before
+    found = LandmarksPerceived(
+        vehicle="car", boot_id="boot-2", sensor="roof", sweep_sequence=1, refusal="", landmarks=()
+    )
+    row = Envelope(EventIdentity("perception", "boot-2", 0), rows()[-1].stamp_ns + later_ns + 1, found)
+    log.append(PERCEIVED_STREAM, [cast(Envelope[Event], row)])
+    assert resumed(log).perceived_number == before
