@@ -137,7 +137,17 @@ class DetectionSettings:
     camera_range: float = 0.005  # ln range
     camera_inverse_range_per_m: float = 0.0014  # of 1 / range: a constant error in the image
     camera_bearing_rad: float = 0.007
+    shared_share: float = 0.5  # of a perceived landmark's variance is one error in all sweeps of a pass
     single_kernel: Kernel = Kernel("cauchy", 2.0)  # of sightings that enter the graph one by one
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MatchedSettings:
+    """How motions found by matching points, lidar odometry, enter the graph beside wheels and IMU."""
+
+    used: bool = True
+    inflation: float = 1.0  # of their covariance
+    kernel: Kernel = Kernel("dcs", 2.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -179,6 +189,7 @@ class SolveSettings:
     calibration: CalibrationPriors = field(default_factory=CalibrationPriors)
     odometry: OdometrySettings = field(default_factory=OdometrySettings)
     detections: DetectionSettings = field(default_factory=DetectionSettings)
+    matched: MatchedSettings = field(default_factory=MatchedSettings)
     anchors: AnchorSettings = field(default_factory=AnchorSettings)
     live: LiveSettings = field(default_factory=LiveSettings)
 

@@ -1,6 +1,5 @@
 """Detections become landmarks: tracks within a pass, joined over passes and vehicles, and joined anew after a solve."""
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +9,14 @@ from trigpoint_optimisation.core.detection_noise import DetectionNoise, measured
 from trigpoint_optimisation.core.fleet import Fleet, detections_in_map
 from trigpoint_optimisation.core.merging import LandmarkGroups, Tracks, voted_pairs
 from trigpoint_optimisation.core.preparation import PreparedDrive
-from trigpoint_optimisation.core.sightings import Sightings, drive_sightings, joined, keyframe_points
+from trigpoint_optimisation.core.sightings import (
+    Averaging,
+    Sightings,
+    drive_sightings,
+    joined,
+    keyframe_points,
+    perceived_covariances,
+)
 from trigpoint_optimisation.core.single_sightings import (
     VEHICLE,
     Seeing,
@@ -182,14 +188,17 @@ def _join_close(groups: LandmarkGroups, tracks: Tracks, settings: DetectionSetti
 
 def fleet_sightings(fleet: Fleet, association: Association) -> Sightings:
     """The averaged sightings of all drives but cameras' under the association."""
-    slack_m = fleet.settings.fixes.landmark_slack_m
     return joined(
         [
             drive_sightings(
                 each,
                 _unless_camera(each, track),
-                point_scale=fleet.frame.point_scale,
-                noise=replace(noise, common_sigma_m=math.hypot(noise.common_sigma_m, slack_m)),
+                Averaging(
+                    point_scale=fleet.frame.point_scale,
+                    noise=noise,
+                    shared_share=fleet.settings.detections.shared_share,
+                    slack_m=fleet.settings.fixes.landmark_slack_m,
+                ),
             )
             for each, track, noise in zip(fleet.prepared, association.track, fleet.noise, strict=True)
         ]
@@ -207,6 +216,14 @@ def fleet_single_sightings(fleet: Fleet, association: Association) -> SingleSigh
     return single_sightings(fleet.prepared, association.track, association.landmark_of_track, seeing)
 
 
+def shared_tracks(sightings: Sightings, track_m: Floats) -> Floats:
+    """The points (t, 2) of tracks whose sightings share an error, NaN for the others."""
+    own = np.full_like(track_m, np.nan)
+    chosen = np.unique(sightings.track[sightings.shared_m2 > 0.0])
+    own[chosen] = track_m[chosen]
+    return own
+
+
 def with_measured_noise(fleet: Fleet, state: MapState, association: Association) -> Fleet:
     """The fleet with the noise that each drive's detections show against the solved landmarks."""
     noise = tuple(
@@ -217,7 +234,9 @@ def with_measured_noise(fleet: Fleet, state: MapState, association: Association)
 
 
 def _measured_drive_noise(fleet: Fleet, index: int, state: MapState, landmark: Ints, track: Ints) -> DetectionNoise:
-    each, rows = fleet.prepared[index], np.nonzero(_unless_camera(fleet.prepared[index], track) >= 0)[0]
+    each = fleet.prepared[index]
+    untold = ~np.isfinite(perceived_covariances(each)).all(axis=(1, 2))
+    rows = np.nonzero((_unless_camera(each, track) >= 0) & untold)[0]
     keyframe, scale = each.detection_keyframe[rows], fleet.frame.point_scale
     pose = state.drives[index].pose[keyframe]
     from_keyframe = state.landmark_m[landmark[track[rows]]] - pose[:, :2]

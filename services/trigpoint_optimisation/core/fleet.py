@@ -16,6 +16,12 @@ from trigpoint_optimisation.core.gauss_newton import MAX_ITERATIONS, solved
 from trigpoint_optimisation.core.graph import add_fixes, chosen_fixes, fix_bias_stamps, fleet_graph
 from trigpoint_optimisation.core.odometry import OdometryCalibration
 from trigpoint_optimisation.core.preparation import PreparedDrive, nominal_calibration, prepared_drive
+from trigpoint_optimisation.core.relative_poses import (
+    add_relative_poses,
+    between_keyframes,
+    hung_motions,
+    widened,
+)
 from trigpoint_optimisation.core.sightings import keyframe_points
 from trigpoint_optimisation.core.state import DriveState, MapState, shared_keys, state_of, values_of
 from trigpoint_optimisation.settings import FixSettings, SolveSettings
@@ -136,8 +142,14 @@ def with_measured_fixes(fleet: Fleet, state: MapState) -> tuple[Fleet, MapState]
 
 
 def motion_graph(fleet: Fleet) -> gtsam.NonlinearFactorGraph:
-    """Odometry and calibration priors of the whole fleet."""
-    return fleet_graph(fleet.prepared, fleet.settings.calibration, point_scale=fleet.frame.point_scale)
+    """Odometry, by wheels and by matched points, and calibration priors of the whole fleet."""
+    scale, matched = fleet.frame.point_scale, fleet.settings.matched
+    graph = fleet_graph(fleet.prepared, fleet.settings.calibration, point_scale=scale)
+    for each in fleet.prepared if matched.used else ():
+        motions = between_keyframes(each, each.drive.matched)
+        relative = hung_motions(each, each, motions, point_scale=scale)
+        add_relative_poses(graph, widened(relative, matched.inflation), kernel=matched.kernel)
+    return graph
 
 
 def georeferenced_graph(fleet: Fleet, *, robust: bool) -> gtsam.NonlinearFactorGraph:

@@ -28,6 +28,7 @@ from trigpoint_optimisation.core.state import (
     pose_key,
     scale_key,
     sensor_key,
+    track_key,
     turn_bias_key,
 )
 from trigpoint_optimisation.settings import CalibrationPriors, FixSettings, Kernel
@@ -196,7 +197,10 @@ def add_fixes(
 def add_sightings(
     graph: gtsam.NonlinearFactorGraph, sightings: Sightings, landmark: Ints, *, kernel: Kernel | None
 ) -> None:
-    """Bearing and range from keyframe to landmark; `landmark` (s,) by sighting, negative ones left out."""
+    """Bearing and range from keyframe to landmark; `landmark` (s,) by sighting, negative ones left out.
+
+    Sightings that share an error are of their track's own point, which is off the landmark by that error.
+    """
     x, y = sightings.point_m.T
     range_m = np.hypot(x, y)
     rows = np.nonzero((landmark >= 0) & (range_m > MIN_RANGE_M))[0]
@@ -205,8 +209,24 @@ def add_sightings(
     bearing = np.arctan2(y, x)
     for row in rows:
         noise = with_kernel(gtsam.noiseModel.Gaussian.Covariance(covariance[row]), kernel)
-        keys = pose_key(int(sightings.drive[row]), int(sightings.keyframe[row])), landmark_key(int(landmark[row]))
+        shared = sightings.shared_m2[row] > 0.0
+        seen = track_key(int(sightings.track[row])) if shared else landmark_key(int(landmark[row]))
+        keys = pose_key(int(sightings.drive[row]), int(sightings.keyframe[row])), seen
         graph.add(gtsam.BearingRangeFactor2D(*keys, gtsam.Rot2(bearing[row]), range_m[row], noise))
+    _add_shared_errors(graph, sightings, landmark, kernel=kernel)
+
+
+def _add_shared_errors(
+    graph: gtsam.NonlinearFactorGraph, sightings: Sightings, landmark: Ints, *, kernel: Kernel | None
+) -> None:
+    """Each track's own point at its landmark, as surely as the error that the track's sightings share is small."""
+    rows = np.nonzero((landmark >= 0) & (sightings.shared_m2 > 0.0))[0]
+    tracks, first, number = np.unique(sightings.track[rows], return_index=True, return_inverse=True)
+    variance_m2 = np.bincount(number, weights=sightings.shared_m2[rows]) / np.maximum(np.bincount(number), 1)
+    for track, row, variance in zip(tracks, rows[first], variance_m2, strict=True):
+        noise = with_kernel(gtsam.noiseModel.Isotropic.Variance(2, variance), kernel)
+        keys = landmark_key(int(landmark[row])), track_key(int(track))
+        graph.add(gtsam.BetweenFactorPoint2(*keys, np.zeros(2), noise))
 
 
 def add_single_sightings(

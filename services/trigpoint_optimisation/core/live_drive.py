@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trigpoint.events.drives import NO_DETECTIONS, NO_FIXES, Drive, ImuSeries, WheelSeries
+from trigpoint.events.drives import CAMERA, NO_DETECTIONS, NO_FIXES, Drive, ImuSeries, WheelSeries
 from trigpoint.events.envelope import Envelope
 from trigpoint.events.observed import (
     GnssFixReceived,
@@ -32,7 +32,7 @@ from trigpoint_optimisation.core.odometry import (
     relative_poses,
     turn_source,
 )
-from trigpoint_optimisation.core.preparation import CAMERA, odometry_noise
+from trigpoint_optimisation.core.preparation import odometry_noise
 from trigpoint_optimisation.core.single_sightings import VEHICLE
 from trigpoint_optimisation.core.trajectory import composed
 from trigpoint_optimisation.settings import CalibrationPriors, SolveSettings

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trigpoint.events.drives import Drive
+from trigpoint.events.drives import CAMERA, Drive
 from trigpoint.geodesy.projection import MapFrame, map_points_from_wgs84
 from trigpoint_optimisation.core.odometry import (
     DeadReckonedPath,
@@ -24,8 +24,6 @@ from trigpoint_optimisation.settings import CalibrationPriors, OdometrySettings,
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
-
-CAMERA = "camera"  # VehicleDescribed.landmark_sensor_model
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -119,8 +119,9 @@ def _moved(state: MapState, group: tuple[int, ...], alignment: RigidAlignment, s
         pose = drives[d].pose
         heading = wrap_angles_rad(pose[:, 2] + T_map_path[2])
         drives[d] = replace(drives[d], pose=np.column_stack([transform_points(T_map_path, pose[:, :2]), heading]))
-    point = state.landmark_m.copy()
-    seers = seen.seers()
+    point, track, seers = state.landmark_m.copy(), state.track_m.copy(), seen.seers()
     own = np.unique(seers[np.isin(seers[:, 0], group), 1])
     point[own] = transform_points(T_map_path, point[own])
-    return replace(state, drives=tuple(drives), landmark_m=point)
+    tracked = np.unique(seen.sightings.track[np.isin(seen.sightings.drive, group) & (seen.sightings.shared_m2 > 0.0)])
+    track[tracked] = transform_points(T_map_path, track[tracked])
+    return replace(state, drives=tuple(drives), landmark_m=point, track_m=track)

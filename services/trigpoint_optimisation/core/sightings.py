@@ -16,13 +16,27 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sightings:
-    """Sightings (s,): drive, keyframe, track; point_m (s, 2) in the keyframe's base frame; covariance (s, 2, 2)."""
+    """Sightings (s,): drive, keyframe, track; point_m (s, 2) in the keyframe's base frame; covariance (s, 2, 2) of what
+    is a sighting's own error; shared_m2 (s,): variance per axis of the error that all of a track's have in common."""
 
     drive: Ints
     keyframe: Ints
     track: Ints
     point_m: Floats
     covariance: Floats
+    shared_m2: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Averaging:
+    """What makes sightings of a drive's detections: the map's metres per metre; `noise` of detections that do not tell
+    their own; `shared_share` of the variance of those that do is one error in a whole track; `slack_m`, 1-sigma, is
+    granted to each sighting besides."""
+
+    point_scale: float
+    noise: DetectionNoise
+    shared_share: float = 0.0
+    slack_m: float = 0.0
 
 
 def keyframe_points(prepared: PreparedDrive, *, point_scale: float) -> Floats:
@@ -43,23 +57,45 @@ def _detection_covariances(prepared: PreparedDrive, noise: DetectionNoise) -> Fl
     )
 
 
-def drive_sightings(prepared: PreparedDrive, track: Ints, *, point_scale: float, noise: DetectionNoise) -> Sightings:
-    """One sighting for each track and keyframe of a drive; `track` (d,) by detection, negative where none."""
+def perceived_covariances(prepared: PreparedDrive) -> Floats:
+    """Covariances (d, 2, 2) of the detected points in their keyframes' frames as the sensor tells them, else NaN."""
+    detections = prepared.drive.detections
+    if detections.covariance_m2 is None:
+        return np.full((len(detections.stamp_ns), 2, 2), np.nan)
+    c, s = np.cos(prepared.detection_offset[:, 2]), np.sin(prepared.detection_offset[:, 2])
+    turn = np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2)
+    turned: Floats = turn @ detections.covariance_m2 @ turn.transpose(0, 2, 1)
+    return turned
+
+
+def drive_sightings(prepared: PreparedDrive, track: Ints, averaging: Averaging) -> Sightings:
+    """One sighting for each track and keyframe of a drive; `track` (d,) by detection, negative where none.
+
+    Detections whose own covariance is told differ less among each other than from the truth: neighbouring sweeps hit
+    the same side of the same thing. Their mean is taken to be no surer than one of them.
+    """
     rows = np.nonzero(track >= 0)[0]
     names = np.column_stack([track[rows], prepared.detection_keyframe[rows]])
     unique, group = np.unique(names, axis=0, return_inverse=True)
     count = np.bincount(group, minlength=len(unique)).astype(np.float64)
-    point = np.zeros((len(unique), 2))
-    covariance = np.zeros((len(unique), 2, 2))
-    np.add.at(point, group, keyframe_points(prepared, point_scale=point_scale)[rows])
-    np.add.at(covariance, group, _detection_covariances(prepared, noise)[rows])
-    covariance = covariance / (count**2)[:, None, None] + noise.common_sigma_m**2 * np.eye(2)
+    own = perceived_covariances(prepared)[rows]
+    told = np.isfinite(own).all(axis=(1, 2))
+    variances = np.where(told[:, None, None], own, _detection_covariances(prepared, averaging.noise)[rows])
+    point, covariance = np.zeros((len(unique), 2)), np.zeros((len(unique), 2, 2))
+    np.add.at(point, group, keyframe_points(prepared, point_scale=averaging.point_scale)[rows])
+    np.add.at(covariance, group, variances)
+    mean = covariance / count[:, None, None]
+    by_perception = np.bincount(group, weights=told, minlength=len(unique)) > 0
+    shared_m2 = np.where(by_perception, averaging.shared_share * 0.5 * np.trace(mean, axis1=1, axis2=2), 0.0)
+    common_m2 = np.where(by_perception, 0.0, averaging.noise.common_sigma_m**2) + averaging.slack_m**2
+    divided = np.where(by_perception, 1.0 / (1.0 - averaging.shared_share), count)
     return Sightings(
         drive=np.full(len(unique), prepared.index, dtype=np.int64),
         keyframe=unique[:, 1],
         track=unique[:, 0],
         point_m=point / count[:, None],
-        covariance=covariance,
+        covariance=mean / divided[:, None, None] + common_m2[:, None, None] * np.eye(2),
+        shared_m2=shared_m2,
     )
 
 
@@ -71,4 +107,5 @@ def joined(parts: Sequence[Sightings]) -> Sightings:
         track=np.concatenate([part.track for part in parts]),
         point_m=np.concatenate([part.point_m for part in parts]),
         covariance=np.concatenate([part.covariance for part in parts]),
+        shared_m2=np.concatenate([part.shared_m2 for part in parts]),
     )

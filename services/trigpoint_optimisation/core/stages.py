@@ -34,6 +34,7 @@ from trigpoint_optimisation.core.association import (
     fleet_single_sightings,
     landmark_means,
     renewed_association,
+    shared_tracks,
     tracks_in_map,
     with_measured_noise,
 )
@@ -150,12 +151,16 @@ def _with_landmarks(placed: PlacedFleet, labels: Labels, progress: Progress) -> 
 
 def _associated(fleet: Fleet, state: MapState, association: Association, labels: Labels) -> Solved:
     """The fleet with landmarks where the association's tracks have their means."""
-    tracks = tracks_in_map(fleet, state, association)
+    tracks, sightings = tracks_in_map(fleet, state, association), fleet_sightings(fleet, association)
     solved = Solved(
         fleet=fleet,
-        state=replace(state, landmark_m=landmark_means(tracks, association.landmark_of_track)),
+        state=replace(
+            state,
+            landmark_m=landmark_means(tracks, association.landmark_of_track),
+            track_m=shared_tracks(sightings, tracks.point_m),
+        ),
         association=association,
-        sightings=fleet_sightings(fleet, association),
+        sightings=sightings,
         singles=fleet_single_sightings(fleet, association),
         labels=labels,
         assignment=no_labels()[1],

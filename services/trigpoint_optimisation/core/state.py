@@ -1,7 +1,7 @@
 """What a solve estimates, as arrays, and its place in gtsam's Values."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import gtsam
 import numpy as np
@@ -42,6 +42,11 @@ def landmark_key(landmark: int) -> int:
     return int(gtsam.symbol("l", landmark))
 
 
+def track_key(track: int) -> int:
+    """Where a track's landmark was seen in its pass: Point2."""
+    return int(gtsam.symbol("p", track))
+
+
 def image_key(image: int) -> int:
     """Offset (2,) of an aerial image: x, y in m, map frame."""
     return int(gtsam.symbol("o", image))
@@ -76,11 +81,13 @@ class DriveState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapState:
-    """All states of a solve. landmark_m (l, 2) and image_m (k, 2): x, y in m, map frame."""
+    """All states of a solve. landmark_m (l, 2) and image_m (k, 2): x, y in m, map frame; track_m (t, 2): where each
+    track was seen whose sightings share an error, NaN where they share none."""
 
     drives: tuple[DriveState, ...]
     landmark_m: Floats
     image_m: Floats
+    track_m: Floats = field(default_factory=lambda: np.zeros((0, 2)))
 
 
 def values_of(state: MapState) -> gtsam.Values:
@@ -98,6 +105,8 @@ def values_of(state: MapState) -> gtsam.Values:
             values.insert(fix_bias_key(d, k), fix_bias)
     for j, point in enumerate(state.landmark_m):
         values.insert(landmark_key(j), point)
+    for track in np.nonzero(np.isfinite(state.track_m).all(axis=1))[0]:
+        values.insert(track_key(int(track)), state.track_m[track])
     for i, offset in enumerate(state.image_m):
         values.insert(image_key(i), offset)
     return values
@@ -122,8 +131,12 @@ def _drive_state(values: gtsam.Values, d: int, like: DriveState) -> DriveState:
 def state_of(values: gtsam.Values, like: MapState) -> MapState:
     """The state that Values hold, of the same sizes as `like`."""
     points = [values.atPoint2(landmark_key(j)) for j in range(len(like.landmark_m))]
+    track_m = like.track_m.copy()
+    for track in np.nonzero(np.isfinite(track_m).all(axis=1))[0]:
+        track_m[track] = values.atPoint2(track_key(int(track)))
     return MapState(
         drives=tuple(_drive_state(values, d, drive) for d, drive in enumerate(like.drives)),
         landmark_m=np.array(points).reshape(-1, 2),
         image_m=_vectors(values, [image_key(i) for i in range(len(like.image_m))], 2),
+        track_m=track_m,
     )

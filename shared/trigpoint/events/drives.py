@@ -29,6 +29,9 @@ DRIVE_KINDS: tuple[type, ...] = (
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+CAMERA = "camera"  # VehicleDescribed.landmark_sensor_model
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,6 +69,7 @@ class DetectionSeries:
     """Landmark detections (n,), one row each, in order of time; `sequence` names the sweep's event.
 
     Bearing counter-clockwise from ahead in the sensor's frame; kind and signature as in LandmarkDetection.
+    `covariance_m2` (n, 2, 2) of x ahead and y left in the base frame; None where the sensor tells none.
     """
 
     stamp_ns: Ints
@@ -75,6 +79,27 @@ class DetectionSeries:
     kind: tuple[str, ...]
     signature: tuple[str, ...]
     sequence: Ints
+    covariance_m2: Floats | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionSeries:
+    """Measured motions (n,) of the base from one stamp to a later one, or to another drive's: motion (n, 3) its x, y in
+    m and heading in rad at the later stamp in the base frame at the earlier one; covariance (n, 3, 3) of the three."""
+
+    from_stamp_ns: Ints
+    stamp_ns: Ints
+    motion: Floats
+    covariance: Floats
+
+    def chosen(self, rows: Ints | Bools) -> "MotionSeries":
+        """The motions of some rows, by index or mask."""
+        return MotionSeries(
+            from_stamp_ns=self.from_stamp_ns[rows],
+            stamp_ns=self.stamp_ns[rows],
+            motion=self.motion[rows],
+            covariance=self.covariance[rows],
+        )
 
 
 NO_FIXES = FixSeries(
@@ -93,11 +118,18 @@ NO_DETECTIONS = DetectionSeries(
     signature=(),
     sequence=np.zeros(0, dtype=np.int64),
 )
+NO_MOTIONS = MotionSeries(
+    from_stamp_ns=np.zeros(0, dtype=np.int64),
+    stamp_ns=np.zeros(0, dtype=np.int64),
+    motion=np.zeros((0, 3)),
+    covariance=np.zeros((0, 3, 3)),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
-    """Everything one vehicle measured in one boot. Each series is sorted by time, not by arrival."""
+    """Everything one vehicle measured in one boot, and what was perceived in its points. Each series is sorted by time,
+    not by arrival. `matched`: the base's motions from sweep to sweep, by matching points."""
 
     vehicle: str
     boot_id: str
@@ -106,6 +138,7 @@ class Drive:
     imu: ImuSeries
     fixes: FixSeries
     detections: DetectionSeries
+    matched: MotionSeries = NO_MOTIONS
 
 
 def _column(values: Iterable[float]) -> Floats:

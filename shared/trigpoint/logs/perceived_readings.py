@@ -1,13 +1,17 @@
-"""What perception found, as detections of the drives it was found in: observations for a solve."""
+"""What perception found, as part of the drives it was found in: detections with their covariances, and motions."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import cast
 
-from trigpoint.events.envelope import Envelope, EventIdentity
+import numpy as np
+
+from trigpoint.events.drives import CAMERA, NO_MOTIONS, DetectionSeries, Drive, MotionSeries
+from trigpoint.events.envelope import Envelope
 from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.observed import LandmarkDetection, LandmarksDetected, VehicleDescribed
-from trigpoint.events.perceived import LandmarksPerceived, PerceivedLandmark
+from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched, Perceived, PerceivedLandmark
 from trigpoint.geodesy.poses import Pose2
 from trigpoint.logs.ports import EventLog
 
@@ -16,38 +20,118 @@ PERCEIVED_STREAM = STREAM_PATTERNS[LandmarksPerceived]
 DriveName = tuple[str, str]
 
 
-def perceived_sweeps(
-    log: EventLog, described: Mapping[DriveName, VehicleDescribed]
-) -> tuple[Envelope[LandmarksDetected], ...]:
-    """The perceived landmarks of the named drives (vehicle, boot), as sweeps of their landmark sensor.
+def with_perceived(drives: Iterable[Drive], log: EventLog) -> tuple[Drive, ...]:
+    """The drives with what perception found in their sweeps: its landmarks among the detections, each named by its
+    sweep's sequence, and the motions it matched.
 
-    Each is named by its sweep's own identity. Where a drive was perceived more than once, by other settings, the last
-    time counts.
+    Where a drive was perceived more than once, by other settings, the last time counts. What the vehicle itself
+    detected stands back where perception found something: both saw the same things. Its detections with a signature
+    stay, other vehicles' too; and a camera's, beside which nothing that was perceived counts.
     """
-    sweeps: dict[DriveName, list[Envelope[LandmarksDetected]]] = {}
-    told_as: dict[DriveName, str] = {}
-    for row in log.read(PERCEIVED_STREAM, kinds=(LandmarksPerceived,)):
-        event, told = cast(LandmarksPerceived, row.envelope.event), row.envelope.identity.boot_id
-        name = (event.vehicle, event.boot_id)
-        if name not in described:
+    drives = tuple(drives)
+    told = _last_told(log, {(drive.vehicle, drive.boot_id) for drive in drives})
+    return tuple(_completed(drive, told.get((drive.vehicle, drive.boot_id), ())) for drive in drives)
+
+
+def _last_told(log: EventLog, names: set[DriveName]) -> dict[DriveName, list[Envelope[Perceived]]]:
+    """What was told of each named drive when it was perceived last."""
+    told: dict[DriveName, list[Envelope[Perceived]]] = {}
+    for row in log.read(PERCEIVED_STREAM, kinds=(LandmarksPerceived, OdometryMatched)):
+        envelope = cast(Envelope[Perceived], row.envelope)
+        name = (envelope.event.vehicle, envelope.event.boot_id)
+        if name not in names:
             continue
-        if told_as.get(name) != told:
-            told_as[name], sweeps[name] = told, []
-        sweeps[name].append(_sweep(event, row.envelope.stamp_ns, described[name]))
-    return tuple(sweep for each in sweeps.values() for sweep in each)
+        earlier = told.setdefault(name, [])
+        if earlier and earlier[-1].identity.boot_id != envelope.identity.boot_id:
+            earlier.clear()
+        earlier.append(envelope)
+    return told
 
 
-def _sweep(event: LandmarksPerceived, stamp_ns: int, described: VehicleDescribed) -> Envelope[LandmarksDetected]:
-    identity = EventIdentity(event.vehicle, event.boot_id, event.sweep_sequence)
-    return Envelope(identity, stamp_ns, detected_in(event, described))
+def _completed(drive: Drive, told: Sequence[Envelope[Perceived]]) -> Drive:
+    swept = [(row.stamp_ns, row.event) for row in told if isinstance(row.event, LandmarksPerceived)]
+    matched = [(row.stamp_ns, row.event) for row in told if isinstance(row.event, OdometryMatched)]
+    detections = drive.detections
+    if any(event.landmarks for _, event in swept) and drive.described.landmark_sensor_model != CAMERA:
+        detections = _joined(_signed(drive.detections), _perceived_series(swept, drive.described))
+    return replace(drive, detections=detections, matched=_motion_series(matched))
+
+
+def _perceived_series(swept: Iterable[tuple[int, LandmarksPerceived]], described: VehicleDescribed) -> DetectionSeries:
+    """The landmarks of sweeps, each with its stamp, as detections by the vehicle's landmark sensor."""
+    T_sensor_base = _T_sensor_base(described)
+    rows = [(stamp_ns, event.sweep_sequence, each) for stamp_ns, event in swept for each in event.landmarks]
+    rows.sort(key=lambda row: row[:2])
+    found = [_detection(each, T_sensor_base) for _, _, each in rows]
+    covariance = [
+        (each.variance_x_m2, each.covariance_xy_m2, each.covariance_xy_m2, each.variance_y_m2) for _, _, each in rows
+    ]
+    return DetectionSeries(
+        stamp_ns=np.array([stamp_ns for stamp_ns, _, _ in rows], dtype=np.int64),
+        range_m=np.array([each.range_m for each in found]),
+        bearing_rad=np.array([each.bearing_rad for each in found]),
+        diameter_m=np.array([each.diameter_m for each in found]),
+        kind=tuple(each.kind for each in found),
+        signature=tuple(each.signature for each in found),
+        sequence=np.array([sequence for _, sequence, _ in rows], dtype=np.int64),
+        covariance_m2=np.array(covariance).reshape(-1, 2, 2),
+    )
+
+
+def _signed(series: DetectionSeries) -> DetectionSeries:
+    """The detections that say what they are of."""
+    rows = [row for row, signature in enumerate(series.signature) if signature]
+    return DetectionSeries(
+        stamp_ns=series.stamp_ns[rows],
+        range_m=series.range_m[rows],
+        bearing_rad=series.bearing_rad[rows],
+        diameter_m=series.diameter_m[rows],
+        kind=tuple(series.kind[row] for row in rows),
+        signature=tuple(series.signature[row] for row in rows),
+        sequence=series.sequence[rows],
+    )
+
+
+def _joined(own: DetectionSeries, perceived: DetectionSeries) -> DetectionSeries:
+    """Both in order of time; NaN covariances of those that have none."""
+    order = np.argsort(np.concatenate([own.stamp_ns, perceived.stamp_ns]), kind="stable")
+    kind, signature = own.kind + perceived.kind, own.signature + perceived.signature
+    none = np.full((len(own.stamp_ns), 2, 2), np.nan)
+    assert perceived.covariance_m2 is not None, "perception tells a covariance of each"
+    return DetectionSeries(
+        stamp_ns=np.concatenate([own.stamp_ns, perceived.stamp_ns])[order],
+        range_m=np.concatenate([own.range_m, perceived.range_m])[order],
+        bearing_rad=np.concatenate([own.bearing_rad, perceived.bearing_rad])[order],
+        diameter_m=np.concatenate([own.diameter_m, perceived.diameter_m])[order],
+        kind=tuple(kind[row] for row in order),
+        signature=tuple(signature[row] for row in order),
+        sequence=np.concatenate([own.sequence, perceived.sequence])[order],
+        covariance_m2=np.concatenate([none, perceived.covariance_m2])[order],
+    )
+
+
+def _motion_series(matched: Iterable[tuple[int, OdometryMatched]]) -> MotionSeries:
+    """Motions from sweep to sweep in order of time."""
+    rows = sorted(matched, key=lambda row: row[0])
+    if not rows:
+        return NO_MOTIONS
+    return MotionSeries(
+        from_stamp_ns=np.array([event.from_stamp_ns for _, event in rows], dtype=np.int64),
+        stamp_ns=np.array([stamp_ns for stamp_ns, _ in rows], dtype=np.int64),
+        motion=np.array([(event.x_m, event.y_m, event.heading_rad) for _, event in rows]),
+        covariance=np.array([event.covariance for _, event in rows]),
+    )
 
 
 def detected_in(event: LandmarksPerceived, described: VehicleDescribed) -> LandmarksDetected:
     """A sweep's landmarks by range and bearing from the vehicle's landmark sensor, without a signature."""
-    T_sensor_base = Pose2(
-        described.landmark_sensor_x_m, described.landmark_sensor_y_m, described.landmark_sensor_yaw_rad
-    ).inverse()
+    T_sensor_base = _T_sensor_base(described)
     return LandmarksDetected(detections=tuple(_detection(landmark, T_sensor_base) for landmark in event.landmarks))
+
+
+def _T_sensor_base(described: VehicleDescribed) -> Pose2:
+    x_m, y_m = described.landmark_sensor_x_m, described.landmark_sensor_y_m
+    return Pose2(x_m, y_m, described.landmark_sensor_yaw_rad).inverse()
 
 
 def _detection(landmark: PerceivedLandmark, T_sensor_base: Pose2) -> LandmarkDetection:

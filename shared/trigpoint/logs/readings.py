@@ -1,6 +1,6 @@
 """What a log holds, folded into the values services work on: frame, drives, anchors, verdicts, map versions."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import cast
 
 from trigpoint.errors import InputError
@@ -14,7 +14,7 @@ from trigpoint.events.observed import MapFramePinned, Observed, VehicleDescribed
 from trigpoint.events.solved import SolvedMap, closed_versions, solved_maps
 from trigpoint.geodesy.positions import GridPosition
 from trigpoint.geodesy.projection import MapFrame, pin_map_frame
-from trigpoint.logs.perceived_readings import perceived_sweeps
+from trigpoint.logs.perceived_readings import with_perceived
 from trigpoint.logs.ports import EventLog
 
 Progress = Callable[[int, int], None]
@@ -58,7 +58,7 @@ def drives_of_vehicle(log: EventLog, vehicle: str) -> tuple[Drive, ...]:
         raise InputError(f"vehicle {vehicle!r} has no drive in the log; these have: {known}")
     logged = log.read(f"{VEHICLE_PREFIX}{vehicle}", kinds=DRIVE_KINDS)
     rows = [cast(Envelope[Observed], row.envelope) for row in logged]
-    return drives_of([*rows, *perceived_sweeps(log, _descriptions(rows))])
+    return with_perceived(drives_of(rows), log)
 
 
 def logged_drives(log: EventLog, *, progress: Progress = in_silence) -> tuple[Drive, ...]:
@@ -78,19 +78,7 @@ def logged_drives(log: EventLog, *, progress: Progress = in_silence) -> tuple[Dr
     if not rows:
         raise InputError(_without_drive(total, len(excluded)))
     progress(total, total)
-    return drives_of([*rows, *perceived_sweeps(log, _descriptions(rows))])
-
-
-def _descriptions(rows: Iterable[Envelope[Observed]]) -> dict[tuple[str, str], VehicleDescribed]:
-    """How each drive's vehicle is described, all-zero where it is not."""
-    described: dict[tuple[str, str], VehicleDescribed] = {}
-    for row in rows:
-        name = (row.identity.source, row.identity.boot_id)
-        if isinstance(row.event, VehicleDescribed):
-            described[name] = row.event
-        elif name not in described:
-            described[name] = VehicleDescribed(vehicle=name[0])
-    return described
+    return with_perceived(drives_of(rows), log)
 
 
 def _without_drive(total: int, excluded: int) -> str:

@@ -186,6 +186,7 @@ def sighted(point_m: Floats, *, sigma_m: float) -> Sightings:
         track=np.zeros(1, dtype=np.int64),
         point_m=point_m[None, :],
         covariance=sigma_m**2 * np.eye(2)[None],
+        shared_m2=np.zeros(1),
     )
 
 

@@ -11,7 +11,7 @@ from solved_worlds.examples import FRAME, SENSOR_M, Lap, World, world
 from trigpoint.geodesy.poses import transform_points
 from trigpoint_optimisation.core.detection_noise import DetectionNoise
 from trigpoint_optimisation.core.preparation import PreparedDrive, nominal_calibration, prepared_drive
-from trigpoint_optimisation.core.sightings import drive_sightings, joined, keyframe_points
+from trigpoint_optimisation.core.sightings import Averaging, drive_sightings, joined, keyframe_points
 from trigpoint_optimisation.core.trajectory import output_stamps, poses_at
 from trigpoint_optimisation.settings import SolveSettings
 
@@ -93,13 +93,13 @@ def test_detections_of_one_track_from_one_keyframe_become_their_mean(prepared: P
     rows = np.nonzero(prepared.detection_keyframe == prepared.detection_keyframe[0])[0]
     track = np.full(len(prepared.detection_keyframe), -1, dtype=np.int64)
     track[rows] = 0
-    (point,) = drive_sightings(prepared, track, point_scale=1.0, noise=NOISE).point_m
+    (point,) = drive_sightings(prepared, track, Averaging(point_scale=1.0, noise=NOISE)).point_m
     np.testing.assert_allclose(point, keyframe_points(prepared, point_scale=1.0)[rows].mean(axis=0))
 
 
 def test_many_detections_are_no_surer_than_what_they_share(prepared: PreparedDrive) -> None:
     track = np.zeros(len(prepared.detection_keyframe), dtype=np.int64)
-    covariance = drive_sightings(prepared, track, point_scale=1.0, noise=NOISE).covariance
+    covariance = drive_sightings(prepared, track, Averaging(point_scale=1.0, noise=NOISE)).covariance
     assert np.linalg.eigvalsh(covariance).min() >= NOISE.common_sigma_m**2
 
 
@@ -108,7 +108,7 @@ def test_independent_detections_average_their_noise(prepared: PreparedDrive) -> 
     rows = np.nonzero(prepared.detection_keyframe == prepared.detection_keyframe[0])[0]
     track = np.full(len(prepared.detection_keyframe), -1, dtype=np.int64)
     track[rows] = 0
-    (covariance,) = drive_sightings(prepared, track, point_scale=1.0, noise=noise).covariance
+    (covariance,) = drive_sightings(prepared, track, Averaging(point_scale=1.0, noise=noise)).covariance
     assert np.trace(covariance) == pytest.approx(0.1**2 / len(rows))  # each 0.1 m along its own ray
 
 
@@ -117,7 +117,7 @@ def test_a_sightings_covariance_lies_along_its_ray(prepared: PreparedDrive) -> N
     track = np.full(len(prepared.detection_keyframe), -1, dtype=np.int64)
     track[0] = 0
     noise = replace(NOISE, common_sigma_m=0.0)
-    sighting = drive_sightings(prepared, track, point_scale=1.0, noise=noise)
+    sighting = drive_sightings(prepared, track, Averaging(point_scale=1.0, noise=noise))
     sensor = transform_points(prepared.detection_offset[:1], SENSOR_M[None, :])
     ray = (sighting.point_m - sensor)[0]
     along = ray / np.hypot(*ray)
@@ -128,12 +128,12 @@ def test_a_sightings_covariance_lies_along_its_ray(prepared: PreparedDrive) -> N
 
 def test_an_untracked_detection_is_no_sighting(prepared: PreparedDrive) -> None:
     none = np.full(len(prepared.detection_keyframe), -1, dtype=np.int64)
-    assert len(drive_sightings(prepared, none, point_scale=1.0, noise=NOISE).track) == 0
+    assert len(drive_sightings(prepared, none, Averaging(point_scale=1.0, noise=NOISE)).track) == 0
 
 
 def test_sightings_of_several_drives_are_put_together_in_order(prepared: PreparedDrive) -> None:
     track = np.zeros(len(prepared.detection_keyframe), dtype=np.int64)
-    one = drive_sightings(prepared, track, point_scale=1.0, noise=NOISE)
+    one = drive_sightings(prepared, track, Averaging(point_scale=1.0, noise=NOISE))
     both = joined([one, replace(one, drive=one.drive + 1)])
     assert both.drive.tolist() == [0] * len(one.drive) + [1] * len(one.drive)
     assert both.point_m.tolist() == [*one.point_m.tolist(), *one.point_m.tolist()]
