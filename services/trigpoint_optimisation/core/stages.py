@@ -48,6 +48,7 @@ from trigpoint_optimisation.core.fleet import (
 )
 from trigpoint_optimisation.core.fleet_placing import LeftOut, PlacedFleet, drivable, placed_fleet
 from trigpoint_optimisation.core.graph import add_labels, add_sightings, add_single_sightings
+from trigpoint_optimisation.core.loops import add_loops, has_loops
 from trigpoint_optimisation.core.marginals import Reduced, covariance_of, reduced
 from trigpoint_optimisation.core.rigid import Seen, rigid_graph, rigid_state
 from trigpoint_optimisation.core.sightings import Sightings
@@ -131,7 +132,8 @@ def _with_landmarks(placed: PlacedFleet, labels: Labels, progress: Progress) -> 
 
     Labels of known landmarks are tied from the start: where fixes do not hold the map, nothing else may.
     """
-    fleet, state = placed.fleet, replace(placed.state, image_m=np.zeros((len(labels.images), 2)))
+    fleet = placed.fleet
+    state = replace(with_loops(fleet, placed.state), image_m=np.zeros((len(labels.images), 2)))
     solved = _associated(fleet, state, first_association(fleet, state), labels)
     solved = replace(solved, left_out=placed.left_out)
     if len(solved.singles.row):
@@ -147,6 +149,18 @@ def _with_landmarks(placed: PlacedFleet, labels: Labels, progress: Progress) -> 
         fleet, state = solved.fleet, solved.state
     solved = _resighted(replace(solved, fleet=fleet, state=state))
     return replace(solved, state=solved_state(full_graph(solved), solved.state))
+
+
+def with_loops(fleet: Fleet, state: MapState) -> MapState:
+    """The state with closed loops let in: their sigmas are wide at first, then ever narrower."""
+    loops, scale = fleet.settings.loops, fleet.frame.point_scale
+    if not any(has_loops(each) for each in fleet.prepared):
+        return state
+    for wide_m in loops.widened_m if loops.used else ():
+        graph = georeferenced_graph(fleet, robust=True)
+        add_loops(graph, fleet.prepared, loops, point_scale=scale, wide_m=wide_m)
+        state = solved_state(graph, state)
+    return state
 
 
 def _associated(fleet: Fleet, state: MapState, association: Association, labels: Labels) -> Solved:
