@@ -1,4 +1,4 @@
-"""A drive that goes round a block almost twice, with the loops it closes on its second time round, some of them wrong."""
+"""A drive that goes round a block almost twice, with the loops it closes the second time round, some of them wrong."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from trigpoint_optimisation.core.odometry import relative_poses
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-LAP = Lap(duration_s=120.0, white_m=3.0, slow_m=2.0, yaw_bias_radps=0.003)
+LAP = Lap(duration_s=120.0, white_m=6.0, slow_m=0.0)
 SIGMA = np.array([0.03, 0.03, 0.002])  # of a loop: m, m, rad
 CLOSED_EVERY_S = 2.0
 WRONG_M, WRONG_RAD = (3.0, 40.0), 1.0  # how far off wrong ones are
@@ -28,7 +28,7 @@ def around_without_landmarks() -> World:
 def with_loops(driven: World, *, wrong_share: float = 0.0, seed: int = 7) -> Drive:
     """Its drive with loops closed wherever it comes by again; a share of them is wrong."""
     rng = np.random.default_rng(seed)
-    again, before = _met(driven.poses[0])
+    again, before = met(driven.poses[0])
     motion = relative_poses(driven.poses[0][before], driven.poses[0][again]) / (FRAME.point_scale, FRAME.point_scale, 1)
     motion = motion + rng.normal(0.0, SIGMA, motion.shape)
     wrong = rng.choice(len(motion), round(wrong_share * len(motion)), replace=False)
@@ -46,8 +46,8 @@ def with_loops(driven: World, *, wrong_share: float = 0.0, seed: int = 7) -> Dri
     return replace(drive, loops=LoopSeries(other=((drive.vehicle, drive.boot_id),) * len(motion), motions=motions))
 
 
-def _met(pose: Floats) -> tuple[Ints, Ints]:
-    """Rows at which the drive is within a metre of where it was half a minute before or more, and those it was there."""
+def met(pose: Floats) -> tuple[Ints, Ints]:
+    """Rows at which the drive is within a metre of where it was half a minute before or earlier, and those of then."""
     step = round(CLOSED_EVERY_S / STEP_S)
     found = []
     for row in range(0, len(pose), step):

@@ -11,11 +11,6 @@ from trigpoint_optimisation.core.relative_poses import RelativePoses, add_relati
 from trigpoint_optimisation.settings import LoopSettings
 
 
-def has_loops(prepared: PreparedDrive) -> bool:
-    """Whether a drive was anywhere again."""
-    return bool(prepared.drive.loops.other)
-
-
 def loop_poses(prepared: Sequence[PreparedDrive], *, point_scale: float) -> list[RelativePoses]:
     """The loops of every drive with itself and each other one; those with a drive that is not there are left out."""
     named = {(each.drive.vehicle, each.drive.boot_id): each for each in prepared}

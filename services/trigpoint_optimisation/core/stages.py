@@ -48,7 +48,7 @@ from trigpoint_optimisation.core.fleet import (
 )
 from trigpoint_optimisation.core.fleet_placing import LeftOut, PlacedFleet, drivable, placed_fleet
 from trigpoint_optimisation.core.graph import add_labels, add_sightings, add_single_sightings
-from trigpoint_optimisation.core.loops import add_loops, has_loops
+from trigpoint_optimisation.core.loops import add_loops, loop_poses
 from trigpoint_optimisation.core.marginals import Reduced, covariance_of, reduced
 from trigpoint_optimisation.core.rigid import Seen, rigid_graph, rigid_state
 from trigpoint_optimisation.core.sightings import Sightings
@@ -62,6 +62,7 @@ Bools = NDArray[np.bool_]
 
 ASSOCIATION_ROUNDS = 3
 SINGLE_KERNELS = (Kernel("cauchy", 10.0), Kernel("cauchy", 3.0), Kernel("cauchy", 2.0))
+WIDENED_ITERATIONS = 5  # with loops' sigmas widened: where it ends is only the next one's start
 SINGLE_ITERATIONS = 5  # at each of them: where it ends is only the next one's start
 
 
@@ -154,12 +155,12 @@ def _with_landmarks(placed: PlacedFleet, labels: Labels, progress: Progress) -> 
 def with_loops(fleet: Fleet, state: MapState) -> MapState:
     """The state with closed loops let in: their sigmas are wide at first, then ever narrower."""
     loops, scale = fleet.settings.loops, fleet.frame.point_scale
-    if not any(has_loops(each) for each in fleet.prepared):
+    if not loops.used or not loop_poses(fleet.prepared, point_scale=scale):
         return state
-    for wide_m in loops.widened_m if loops.used else ():
+    for wide_m in loops.widened_m:
         graph = georeferenced_graph(fleet, robust=True)
         add_loops(graph, fleet.prepared, loops, point_scale=scale, wide_m=wide_m)
-        state = solved_state(graph, state)
+        state = solved_state(graph, state, max_iterations=WIDENED_ITERATIONS)
     return state
 
 
