@@ -43,7 +43,7 @@ def proposals(
     for drive in others:
         for each in alike(triangles, triangles_of(drive, settings.triangle), settings.triangle):
             one, other = ones[each.one], drive[each.other]
-            if not _is_no_return(one, other, settings.triangle.apart_m):
+            if not _is_no_return(one, other.run, other.row, settings.triangle.apart_m):
                 rivals.setdefault(each.one, []).append((each.votes, other, each.motion))
     for number, named in sorted(rivals.items()):
         named.sort(key=lambda rival: -rival[0])
@@ -54,6 +54,8 @@ def _places(one: Submap, rivals: Sequence[tuple[int, Submap, Floats]], settings:
     taken: list[tuple[Run, float]] = []
     for _, other, T_other_one in rivals:
         row, motion = nearest_sweep(other, T_other_one, within_m=settings.submap.span_m)
+        if _is_no_return(one, other.run, row, settings.triangle.apart_m):
+            continue
         at_m = float(other.run.path_m[row])
         if any(run is other.run and abs(place_m - at_m) < settings.submap.span_m for run, place_m in taken):
             continue
@@ -63,9 +65,9 @@ def _places(one: Submap, rivals: Sequence[tuple[int, Submap, Floats]], settings:
             return
 
 
-def _is_no_return(one: Submap, other: Submap, apart_m: float) -> bool:
-    """Whether a submap's run was not yet far away from the other since."""
-    return one.run is other.run and float(one.run.path_m[one.row] - one.run.path_m[other.row]) < apart_m
+def _is_no_return(one: Submap, run: Run, row: int, apart_m: float) -> bool:
+    """Whether a submap's run was not yet far away since a sweep of a run, as it can only have been from its own."""
+    return one.run is run and float(run.path_m[one.row] - run.path_m[row]) < apart_m
 
 
 def nearest_sweep(other: Submap, T_other_one: Floats, *, within_m: float) -> tuple[int, Floats]:
