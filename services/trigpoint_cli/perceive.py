@@ -10,6 +10,7 @@ from trigpoint.workers import workers
 from trigpoint_cli.data_dir import DataDirectory, cluster_option, data_option
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering, counted
 from trigpoint_perception.app import DriveReport, perceive_log
+from trigpoint_perception.closing import LoopReport, close_loops
 
 
 @click.command("perceive")
@@ -17,14 +18,18 @@ from trigpoint_perception.app import DriveReport, perceive_log
 @cluster_option
 @answering
 def command(data: DataDirectory, *, cluster: str, screen: Screen) -> Answer:
-    """Search the sweeps of every drive that is not excluded for poles and building corners, and match them for
-    odometry; what was said already is not said again.
+    """Search the sweeps of every drive that is not excluded for poles and building corners, match them for odometry,
+    and close its loops: places it comes back to, or that another drive was at. What was said already is not said again.
 
     Sweeps that cannot be used are counted by reason, kept with it in the log, and end the command with status 2 after
     everything else was done.
     """
-    with data.opened_log() as log, workers(cluster) as some, screen.part_of("perceiving") as progress:
-        reports = perceive_log(log, partial(McapLog, data.log.absolute()), some=some, progress=progress)
+    open_log = partial(McapLog, data.log.absolute())
+    with data.opened_log() as log, workers(cluster) as some:
+        with screen.part_of("perceiving") as progress:
+            reports = perceive_log(log, open_log, some=some, progress=progress)
+        with screen.part_of("closing loops") as progress:
+            loops = close_loops(log, open_log, some=some, progress=progress)
     if not reports:
         raise InputError(f"{data.log}: no drive has lidar sweeps, or all that have are excluded")
     complaints = tuple(
@@ -32,8 +37,12 @@ def command(data: DataDirectory, *, cluster: str, screen: Screen) -> Answer:
         for one in reports
         for reason, count in one.refused
     )
-    values = {"drives": [_item(one) for one in reports], "appended": sum(one.appended for one in reports)}
-    return Answer(values, tuple(map(_line, reports)), complaints)
+    values = {
+        "drives": [_item(one) for one in reports],
+        "loops": [_loop_item(one) for one in loops],
+        "appended": sum(one.appended for one in reports) + sum(one.appended for one in loops),
+    }
+    return Answer(values, (*map(_line, reports), *map(_loop_line, loops)), complaints)
 
 
 def _item(one: DriveReport) -> JsonObject:
@@ -55,3 +64,19 @@ def _line(one: DriveReport) -> str:
         f"{one.vehicle}: {counted(one.sweeps, 'sweep')}, {one.matched} matched; {counted(one.poles, 'pole')} and "
         f"{counted(one.corners, 'corner')} seen {one.sights} times; {one.appended} events appended"
     )
+
+
+def _loop_item(one: LoopReport) -> JsonObject:
+    return {
+        "vehicle": one.vehicle,
+        "boot_id": one.boot_id,
+        "proposed": one.proposed,
+        "verified": one.verified,
+        "refused": dict(one.refused),
+        "appended": one.appended,
+    }
+
+
+def _loop_line(one: LoopReport) -> str:
+    reasons = "".join(f"; {count} refused: {reason}" for reason, count in one.refused)
+    return f"{one.vehicle}: {counted(one.proposed, 'loop')} proposed, {one.verified} closed{reasons}"

@@ -152,6 +152,18 @@ class MatchedSettings:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class LoopSettings:
+    """How closed loops enter the graph: first with sigmas as wide as a path placed by fixes may be off, then ever
+    narrower, so that a right one is let in and a wrong one let go before either could bend the path."""
+
+    used: bool = True
+    widened_m: tuple[float, ...] = (4.0, 1.0, 0.25)
+    widened_rad_per_m: float = 0.02
+    widened_kernel: Kernel = Kernel("cauchy", 2.0)
+    kernel: Kernel = Kernel("dcs", 3.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class AnchorSettings:
     """How labels find their landmarks and when they are disbelieved."""
 
@@ -191,6 +203,7 @@ class SolveSettings:
     odometry: OdometrySettings = field(default_factory=OdometrySettings)
     detections: DetectionSettings = field(default_factory=DetectionSettings)
     matched: MatchedSettings = field(default_factory=MatchedSettings)
+    loops: LoopSettings = field(default_factory=LoopSettings)
     anchors: AnchorSettings = field(default_factory=AnchorSettings)
     live: LiveSettings = field(default_factory=LiveSettings)
 

@@ -1,5 +1,6 @@
-"""Finds poles and building corners in lidar sweeps, and how the vehicle moved between them.
+"""Finds poles and building corners in lidar sweeps, how the vehicle moved between them, and places it comes
+back to.
 
 Reads: DriveExcluded, DriveIncluded, ImuMeasured, PointsScanned, VehicleDescribed, WheelPairMeasured, WheelSpeedMeasured
-Writes: LandmarksPerceived, OdometryMatched
+Writes: LandmarksPerceived, LoopClosed, LoopsSought, OdometryMatched
 """

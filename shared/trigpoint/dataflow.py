@@ -33,7 +33,7 @@ from trigpoint.events.observed import (
     WheelPairMeasured,
     WheelSpeedMeasured,
 )
-from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched
+from trigpoint.events.perceived import LandmarksPerceived, LoopClosed, LoopsSought, OdometryMatched
 from trigpoint.events.scanned import PointsScanned
 
 T = TypeVar("T")
@@ -99,6 +99,8 @@ FLOWS: tuple[Flow, ...] = (
     Flow(GateAlarmed, FILTERING, (EVALUATION,)),
     Flow(LandmarksPerceived, PERCEPTION, (OPTIMISATION, EVALUATION)),
     Flow(OdometryMatched, PERCEPTION, ()),
+    Flow(LoopClosed, PERCEPTION, (OPTIMISATION,)),
+    Flow(LoopsSought, PERCEPTION, ()),
     Flow(TrajectorySolved, OPTIMISATION, (LANDMARKS, EVALUATION, TILES)),
     Flow(LandmarkSolved, OPTIMISATION, (LANDMARKS, EVALUATION, TILES)),
     Flow(AnchorAssociated, OPTIMISATION, (LANDMARKS, EVALUATION)),

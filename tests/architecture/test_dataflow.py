@@ -17,7 +17,12 @@ from trigpoint_schemas.v1 import asked_pb2
 
 REPOSITORY = Path(__file__).parents[2]
 SERVICES = sorted(path.name for path in (REPOSITORY / "services").iterdir() if path.is_dir())
-PARTS_OF_EVENTS = {observed.LandmarkDetection, perceived.PerceivedLandmark}  # values inside an event
+PARTS_OF_EVENTS = {  # values inside an event
+    observed.LandmarkDetection,
+    perceived.PerceivedLandmark,
+    perceived.RefusedLoops,
+    perceived.SoughtDrive,
+}
 
 
 def declared(service: str, heading: str) -> set[str]:

@@ -31,7 +31,15 @@ from trigpoint.events.observed import (
     WheelPairMeasured,
     WheelSpeedMeasured,
 )
-from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched, PerceivedLandmark
+from trigpoint.events.perceived import (
+    LandmarksPerceived,
+    LoopClosed,
+    LoopsSought,
+    OdometryMatched,
+    PerceivedLandmark,
+    RefusedLoops,
+    SoughtDrive,
+)
 from trigpoint.events.scanned import PointsScanned
 
 any_float = st.floats()
@@ -148,6 +156,33 @@ ANY_EVENT: dict[type, SearchStrategy[object]] = {
         heading_rad=any_float,
         covariance=_array(3, 3),
         matched_share=any_float,
+    ),
+    LoopClosed: st.builds(
+        LoopClosed,
+        vehicle=any_text,
+        boot_id=any_text,
+        sensor=any_text,
+        sweep_sequence=any_int,
+        other_vehicle=any_text,
+        other_boot_id=any_text,
+        other_sensor=any_text,
+        other_sequence=any_int,
+        other_stamp_ns=any_int,
+        x_m=any_float,
+        y_m=any_float,
+        heading_rad=any_float,
+        covariance=_array(3, 3),
+        matched_share=any_float,
+        pairs=any_int,
+    ),
+    LoopsSought: st.builds(
+        LoopsSought,
+        vehicle=any_text,
+        boot_id=any_text,
+        among=st.lists(_flat(SoughtDrive), max_size=3).map(tuple),
+        proposed=any_int,
+        verified=any_int,
+        refused=st.lists(_flat(RefusedLoops), max_size=3).map(tuple),
     ),
     MapSolved: st.builds(
         MapSolved,

@@ -28,7 +28,15 @@ from trigpoint.events.observed import (
     WheelPairMeasured,
     WheelSpeedMeasured,
 )
-from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched, PerceivedLandmark
+from trigpoint.events.perceived import (
+    LandmarksPerceived,
+    LoopClosed,
+    LoopsSought,
+    OdometryMatched,
+    PerceivedLandmark,
+    RefusedLoops,
+    SoughtDrive,
+)
 from trigpoint.events.scanned import PointsScanned
 
 EVENTS: tuple[Event, ...] = (
@@ -146,6 +154,31 @@ EVENTS: tuple[Event, ...] = (
         heading_rad=0.002,
         covariance=np.diag([1e-4, 2e-4, 1e-6]),
         matched_share=0.93,
+    ),
+    LoopClosed(
+        vehicle="van",
+        boot_id="boot-2",
+        sensor="roof",
+        sweep_sequence=912,
+        other_vehicle="car",
+        other_boot_id="boot-1",
+        other_sensor="front",
+        other_sequence=44,
+        other_stamp_ns=1_700_000_000_000_000_000,
+        x_m=-1.25,
+        y_m=3.5,
+        heading_rad=-3.0,
+        covariance=np.diag([4e-4, 9e-4, 1e-6]),
+        matched_share=0.81,
+        pairs=12,
+    ),
+    LoopsSought(
+        vehicle="van",
+        boot_id="boot-2",
+        among=(SoughtDrive(vehicle="car", boot_id="boot-1"), SoughtDrive(vehicle="van", boot_id="boot-2")),
+        proposed=9,
+        verified=7,
+        refused=(RefusedLoops(reason="few points match", count=2),),
     ),
     MapSolved(
         map_version=3,

@@ -73,3 +73,69 @@ class OdometryMatched(_message.Message):
     covariance: _containers.RepeatedScalarFieldContainer[float]
     matched_share: float
     def __init__(self, vehicle: _Optional[str] = ..., boot_id: _Optional[str] = ..., sensor: _Optional[str] = ..., from_sequence: _Optional[int] = ..., from_stamp_ns: _Optional[int] = ..., sweep_sequence: _Optional[int] = ..., x_m: _Optional[float] = ..., y_m: _Optional[float] = ..., heading_rad: _Optional[float] = ..., covariance: _Optional[_Iterable[float]] = ..., matched_share: _Optional[float] = ...) -> None: ...
+
+class LoopClosed(_message.Message):
+    __slots__ = ("vehicle", "boot_id", "sensor", "sweep_sequence", "other_vehicle", "other_boot_id", "other_sensor", "other_sequence", "other_stamp_ns", "x_m", "y_m", "heading_rad", "covariance", "matched_share", "pairs")
+    VEHICLE_FIELD_NUMBER: _ClassVar[int]
+    BOOT_ID_FIELD_NUMBER: _ClassVar[int]
+    SENSOR_FIELD_NUMBER: _ClassVar[int]
+    SWEEP_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    OTHER_VEHICLE_FIELD_NUMBER: _ClassVar[int]
+    OTHER_BOOT_ID_FIELD_NUMBER: _ClassVar[int]
+    OTHER_SENSOR_FIELD_NUMBER: _ClassVar[int]
+    OTHER_SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    OTHER_STAMP_NS_FIELD_NUMBER: _ClassVar[int]
+    X_M_FIELD_NUMBER: _ClassVar[int]
+    Y_M_FIELD_NUMBER: _ClassVar[int]
+    HEADING_RAD_FIELD_NUMBER: _ClassVar[int]
+    COVARIANCE_FIELD_NUMBER: _ClassVar[int]
+    MATCHED_SHARE_FIELD_NUMBER: _ClassVar[int]
+    PAIRS_FIELD_NUMBER: _ClassVar[int]
+    vehicle: str
+    boot_id: str
+    sensor: str
+    sweep_sequence: int
+    other_vehicle: str
+    other_boot_id: str
+    other_sensor: str
+    other_sequence: int
+    other_stamp_ns: int
+    x_m: float
+    y_m: float
+    heading_rad: float
+    covariance: _containers.RepeatedScalarFieldContainer[float]
+    matched_share: float
+    pairs: int
+    def __init__(self, vehicle: _Optional[str] = ..., boot_id: _Optional[str] = ..., sensor: _Optional[str] = ..., sweep_sequence: _Optional[int] = ..., other_vehicle: _Optional[str] = ..., other_boot_id: _Optional[str] = ..., other_sensor: _Optional[str] = ..., other_sequence: _Optional[int] = ..., other_stamp_ns: _Optional[int] = ..., x_m: _Optional[float] = ..., y_m: _Optional[float] = ..., heading_rad: _Optional[float] = ..., covariance: _Optional[_Iterable[float]] = ..., matched_share: _Optional[float] = ..., pairs: _Optional[int] = ...) -> None: ...
+
+class SoughtDrive(_message.Message):
+    __slots__ = ("vehicle", "boot_id")
+    VEHICLE_FIELD_NUMBER: _ClassVar[int]
+    BOOT_ID_FIELD_NUMBER: _ClassVar[int]
+    vehicle: str
+    boot_id: str
+    def __init__(self, vehicle: _Optional[str] = ..., boot_id: _Optional[str] = ...) -> None: ...
+
+class RefusedLoops(_message.Message):
+    __slots__ = ("reason", "count")
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    COUNT_FIELD_NUMBER: _ClassVar[int]
+    reason: str
+    count: int
+    def __init__(self, reason: _Optional[str] = ..., count: _Optional[int] = ...) -> None: ...
+
+class LoopsSought(_message.Message):
+    __slots__ = ("vehicle", "boot_id", "among", "proposed", "verified", "refused")
+    VEHICLE_FIELD_NUMBER: _ClassVar[int]
+    BOOT_ID_FIELD_NUMBER: _ClassVar[int]
+    AMONG_FIELD_NUMBER: _ClassVar[int]
+    PROPOSED_FIELD_NUMBER: _ClassVar[int]
+    VERIFIED_FIELD_NUMBER: _ClassVar[int]
+    REFUSED_FIELD_NUMBER: _ClassVar[int]
+    vehicle: str
+    boot_id: str
+    among: _containers.RepeatedCompositeFieldContainer[SoughtDrive]
+    proposed: int
+    verified: int
+    refused: _containers.RepeatedCompositeFieldContainer[RefusedLoops]
+    def __init__(self, vehicle: _Optional[str] = ..., boot_id: _Optional[str] = ..., among: _Optional[_Iterable[_Union[SoughtDrive, _Mapping[str, object]]]] = ..., proposed: _Optional[int] = ..., verified: _Optional[int] = ..., refused: _Optional[_Iterable[_Union[RefusedLoops, _Mapping[str, object]]]] = ...) -> None: ...

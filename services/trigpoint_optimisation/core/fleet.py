@@ -14,6 +14,7 @@ from trigpoint_optimisation.core.detection_noise import DetectionNoise, nominal_
 from trigpoint_optimisation.core.fix_noise import measured_fix_settings
 from trigpoint_optimisation.core.gauss_newton import MAX_ITERATIONS, solved
 from trigpoint_optimisation.core.graph import add_fixes, chosen_fixes, fix_bias_stamps, fleet_graph
+from trigpoint_optimisation.core.loops import add_loops
 from trigpoint_optimisation.core.odometry import OdometryCalibration
 from trigpoint_optimisation.core.preparation import PreparedDrive, nominal_calibration, prepared_drive
 from trigpoint_optimisation.core.relative_poses import (
@@ -142,13 +143,14 @@ def with_measured_fixes(fleet: Fleet, state: MapState) -> tuple[Fleet, MapState]
 
 
 def motion_graph(fleet: Fleet) -> gtsam.NonlinearFactorGraph:
-    """Odometry, by wheels and by matched points, and calibration priors of the whole fleet."""
+    """Odometry, by wheels and by matched points, closed loops, and calibration priors of the whole fleet."""
     scale, matched = fleet.frame.point_scale, fleet.settings.matched
     graph = fleet_graph(fleet.prepared, fleet.settings.calibration, point_scale=scale)
     for each in fleet.prepared if matched.used else ():
         motions = between_keyframes(each, each.drive.matched)
         relative = hung_motions(each, each, motions, point_scale=scale)
         add_relative_poses(graph, scaled(relative, matched.covariance_factor), kernel=matched.kernel)
+    add_loops(graph, fleet.prepared, fleet.settings.loops, point_scale=scale)
     return graph
 
 

@@ -48,6 +48,7 @@ from trigpoint_optimisation.core.fleet import (
 )
 from trigpoint_optimisation.core.fleet_placing import LeftOut, PlacedFleet, drivable, placed_fleet
 from trigpoint_optimisation.core.graph import add_labels, add_sightings, add_single_sightings
+from trigpoint_optimisation.core.loops import add_loops, loop_poses
 from trigpoint_optimisation.core.marginals import Reduced, covariance_of, reduced
 from trigpoint_optimisation.core.rigid import Seen, rigid_graph, rigid_state
 from trigpoint_optimisation.core.sightings import Sightings
@@ -61,6 +62,7 @@ Bools = NDArray[np.bool_]
 
 ASSOCIATION_ROUNDS = 3
 SINGLE_KERNELS = (Kernel("cauchy", 10.0), Kernel("cauchy", 3.0), Kernel("cauchy", 2.0))
+WIDENED_ITERATIONS = 5  # with loops' sigmas widened: where it ends is only the next one's start
 SINGLE_ITERATIONS = 5  # at each of them: where it ends is only the next one's start
 
 
@@ -131,7 +133,8 @@ def _with_landmarks(placed: PlacedFleet, labels: Labels, progress: Progress) -> 
 
     Labels of known landmarks are tied from the start: where fixes do not hold the map, nothing else may.
     """
-    fleet, state = placed.fleet, replace(placed.state, image_m=np.zeros((len(labels.images), 2)))
+    fleet = placed.fleet
+    state = replace(with_loops(fleet, placed.state), image_m=np.zeros((len(labels.images), 2)))
     solved = _associated(fleet, state, first_association(fleet, state), labels)
     solved = replace(solved, left_out=placed.left_out)
     if len(solved.singles.row):
@@ -147,6 +150,18 @@ def _with_landmarks(placed: PlacedFleet, labels: Labels, progress: Progress) -> 
         fleet, state = solved.fleet, solved.state
     solved = _resighted(replace(solved, fleet=fleet, state=state))
     return replace(solved, state=solved_state(full_graph(solved), solved.state))
+
+
+def with_loops(fleet: Fleet, state: MapState) -> MapState:
+    """The state with closed loops let in: their sigmas are wide at first, then ever narrower."""
+    loops, scale = fleet.settings.loops, fleet.frame.point_scale
+    if not loops.used or not loop_poses(fleet.prepared, point_scale=scale):
+        return state
+    for wide_m in loops.widened_m:
+        graph = georeferenced_graph(fleet, robust=True)
+        add_loops(graph, fleet.prepared, loops, point_scale=scale, wide_m=wide_m)
+        state = solved_state(graph, state, max_iterations=WIDENED_ITERATIONS)
+    return state
 
 
 def _associated(fleet: Fleet, state: MapState, association: Association, labels: Labels) -> Solved:

@@ -54,7 +54,9 @@ class LidarOdometry:
             rotation_epsilon=ROTATION_STEP_RAD,
         )
         share = found.num_inliers / max(cloud.size(), 1)
-        covariance = _covariance(np.asarray(found.H), float(found.error), found.num_inliers, settings)
+        covariance = planar_covariance(
+            np.asarray(found.H), float(found.error), found.num_inliers, inflation=settings.inflation
+        )
         refusal = _refusal(share, covariance, settings)
         placed = expected if refusal else np.asarray(found.T_target_source)
         self._map.insert(cloud, placed)
@@ -70,7 +72,7 @@ def _refusal(share: float, covariance: Floats, settings: OdometrySettings) -> st
     return ""
 
 
-def _covariance(information: Floats, error: float, inliers: int, settings: OdometrySettings) -> Floats:
+def planar_covariance(information: Floats, error: float, inliers: int, *, inflation: float) -> Floats:
     """The covariance (3, 3) of x, y, heading from the match's information (6, 6), rotation first.
 
     Neighbouring points see the same surface, so that as many points tell less than they would alone: the covariance is
@@ -79,7 +81,7 @@ def _covariance(information: Floats, error: float, inliers: int, settings: Odome
     values, vectors = np.linalg.eigh(information)
     values = np.maximum(values, 1e-6 * values[-1])  # a direction nothing fixes is loose, not infinite
     full = (vectors / values) @ vectors.T
-    scale = max(1.0, 2.0 * error / max(3 * inliers, 1)) * settings.inflation
+    scale = max(1.0, 2.0 * error / max(3 * inliers, 1)) * inflation
     planar: Floats = full[PLANAR] * scale
     return planar
 

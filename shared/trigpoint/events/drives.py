@@ -102,6 +102,15 @@ class MotionSeries:
         )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopSeries:
+    """Places known again (n,): `other` (n,) names vehicle and boot of the drive that was there before, possibly this
+    one; `motions` are from the other's base at `from_stamp_ns` to this drive's at `stamp_ns`."""
+
+    other: tuple[tuple[str, str], ...]
+    motions: MotionSeries
+
+
 NO_FIXES = FixSeries(
     stamp_ns=np.zeros(0, dtype=np.int64),
     lat_deg=np.zeros(0),
@@ -124,12 +133,14 @@ NO_MOTIONS = MotionSeries(
     motion=np.zeros((0, 3)),
     covariance=np.zeros((0, 3, 3)),
 )
+NO_LOOPS = LoopSeries(other=(), motions=NO_MOTIONS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
     """Everything one vehicle measured in one boot, and what was perceived in its points. Each series is sorted by time,
-    not by arrival. `matched`: the base's motions from sweep to sweep, by matching points."""
+    not by arrival. `matched`: the base's motions from sweep to sweep, by matching points; `loops`: places known again.
+    """
 
     vehicle: str
     boot_id: str
@@ -139,6 +150,7 @@ class Drive:
     fixes: FixSeries
     detections: DetectionSeries
     matched: MotionSeries = NO_MOTIONS
+    loops: LoopSeries = NO_LOOPS
 
 
 def _column(values: Iterable[float]) -> Floats:

@@ -36,8 +36,8 @@ from trigpoint.events.observed import (
     WheelPairMeasured,
     WheelSpeedMeasured,
 )
-from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched
-from trigpoint.events.perceived_forms import perceived_event, perceived_message
+from trigpoint.events.perceived import LandmarksPerceived, LoopClosed, LoopsSought, OdometryMatched
+from trigpoint.events.perceived_forms import perceived_event, perceived_message, sought_event, sought_message
 from trigpoint.events.scanned import PointsScanned
 from trigpoint_schemas.v1 import corrected_pb2, estimated_pb2, mapped_pb2, observed_pb2, perceived_pb2
 
@@ -357,6 +357,8 @@ FORMS: tuple[Form[Any, Any], ...] = (
     _flat(GateAlarmed, estimated_pb2.GateAlarmed),
     Form(LandmarksPerceived, perceived_pb2.LandmarksPerceived, perceived_message, perceived_event),
     _with_covariance(OdometryMatched, perceived_pb2.OdometryMatched),
+    _with_covariance(LoopClosed, perceived_pb2.LoopClosed),
+    Form(LoopsSought, perceived_pb2.LoopsSought, sought_message, sought_event),
     Form(MapSolved, mapped_pb2.MapSolved, _map_message, _map_event),
     Form(TrajectorySolved, mapped_pb2.TrajectorySolved, _trajectory_message, _trajectory_event),
     Form(LandmarkSolved, mapped_pb2.LandmarkSolved, _landmark_message, _landmark_event),

@@ -27,7 +27,7 @@ from trigpoint.events.observed import (
     WheelPairMeasured,
     WheelSpeedMeasured,
 )
-from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched
+from trigpoint.events.perceived import LandmarksPerceived, LoopClosed, LoopsSought, OdometryMatched
 from trigpoint.events.scanned import PointsScanned
 from trigpoint.geodesy.positions import MapPosition
 from trigpoint.geodesy.web_tiles import tile_at
@@ -41,6 +41,8 @@ VEHICLE_NAMING = (
     GateAlarmed,
     LandmarksPerceived,
     OdometryMatched,
+    LoopClosed,
+    LoopsSought,
     TrajectorySolved,
     OdometryCorrected,
 )
@@ -71,6 +73,8 @@ KEY_PATTERNS: Mapping[type, str] = {
     GateAlarmed: "veh/{vehicle}/est/gate",
     LandmarksPerceived: "veh/{vehicle}/perc/landmarks",
     OdometryMatched: "veh/{vehicle}/perc/odometry",
+    LoopClosed: "veh/{vehicle}/perc/loop",
+    LoopsSought: "veh/{vehicle}/perc/loop-search",
     TrajectorySolved: "map/{map}/trajectory/{vehicle}",
     LandmarkSolved: "map/{map}/lm/{zoom}/{column}/{row}",
     AnchorAssociated: "map/{map}/association",
@@ -103,6 +107,8 @@ STREAM_PATTERNS: Mapping[type, str] = {
     GateAlarmed: "filtering",
     LandmarksPerceived: "perception",
     OdometryMatched: "perception",
+    LoopClosed: "perception",
+    LoopsSought: "perception",
     TrajectorySolved: "optimisation",
     LandmarkSolved: "optimisation",
     AnchorAssociated: "optimisation",

@@ -64,4 +64,59 @@ class OdometryMatched:
     matched_share: float
 
 
-Perceived = LandmarksPerceived | OdometryMatched
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopClosed:
+    """A place known again: where the base was at one sweep, as seen from where a base was at another, of the same drive
+    long before or of another drive; proposed by landmarks and verified by points. The event's stamp is the one's.
+
+    x, y in m and heading in rad of the one's base in the base frame at the other sweep; covariance (3, 3) of the three.
+    `matched_share` of the upright points that lie on the other's; `pairs`: landmarks that proposed it.
+    """
+
+    vehicle: str
+    boot_id: str
+    sensor: str
+    sweep_sequence: int
+    other_vehicle: str
+    other_boot_id: str
+    other_sensor: str
+    other_sequence: int
+    other_stamp_ns: int
+    x_m: float
+    y_m: float
+    heading_rad: float
+    covariance: NDArray[np.float64]
+    matched_share: float
+    pairs: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SoughtDrive:
+    """A drive in which a place was sought."""
+
+    vehicle: str
+    boot_id: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RefusedLoops:
+    """How many proposals were refused for a reason."""
+
+    reason: str
+    count: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopsSought:
+    """A drive's places were sought among those of some drives, possibly itself: how many places landmarks proposed, how
+    many of these points verified (each is a LoopClosed), and why the others were refused. It follows its LoopClosed."""
+
+    vehicle: str
+    boot_id: str
+    among: tuple[SoughtDrive, ...]
+    proposed: int
+    verified: int
+    refused: tuple[RefusedLoops, ...]
+
+
+Perceived = LandmarksPerceived | OdometryMatched | LoopClosed | LoopsSought

@@ -1,4 +1,4 @@
-"""What perception found, as part of the drives it was found in: detections with their covariances, and motions."""
+"""What perception found, as part of the drives it was found in: detections with their covariances, motions, loops."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -7,11 +7,11 @@ from typing import cast
 
 import numpy as np
 
-from trigpoint.events.drives import CAMERA, NO_MOTIONS, DetectionSeries, Drive, MotionSeries
+from trigpoint.events.drives import CAMERA, NO_LOOPS, NO_MOTIONS, DetectionSeries, Drive, LoopSeries, MotionSeries
 from trigpoint.events.envelope import Envelope
 from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.observed import LandmarkDetection, LandmarksDetected, VehicleDescribed
-from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched, Perceived, PerceivedLandmark
+from trigpoint.events.perceived import LandmarksPerceived, LoopClosed, OdometryMatched, Perceived, PerceivedLandmark
 from trigpoint.geodesy.poses import Pose2
 from trigpoint.logs.ports import EventLog
 
@@ -22,21 +22,29 @@ DriveName = tuple[str, str]
 
 def with_perceived(drives: Iterable[Drive], log: EventLog) -> tuple[Drive, ...]:
     """The drives with what perception found in their sweeps: its landmarks among the detections, each named by its
-    sweep's sequence, and the motions it matched.
+    sweep's sequence, the motions it matched, and the loops it closed.
 
-    Where a drive was perceived more than once, by other settings, the last time counts. What the vehicle itself
-    detected stands back where perception found something: both saw the same things. Its detections with a signature
-    stay, other vehicles' too; and a camera's, beside which nothing that was perceived counts.
+    Where a drive was perceived, or its loops sought, more than once, by other settings, the last time counts. What the
+    vehicle itself detected stands back where perception found something: both saw the same things. Its detections with
+    a signature stay, other vehicles' too; and a camera's, beside which nothing that was perceived counts.
     """
     drives = tuple(drives)
-    told = _last_told(log, {(drive.vehicle, drive.boot_id) for drive in drives})
-    return tuple(_completed(drive, told.get((drive.vehicle, drive.boot_id), ())) for drive in drives)
+    names = {(drive.vehicle, drive.boot_id) for drive in drives}
+    told = _last_told(log, names, (LandmarksPerceived, OdometryMatched))
+    loops = _last_told(log, names, (LoopClosed,))
+    return tuple(
+        replace(_completed(drive, told.get(name, ())), loops=_loop_series(loops.get(name, ())))
+        for drive in drives
+        for name in ((drive.vehicle, drive.boot_id),)
+    )
 
 
-def _last_told(log: EventLog, names: set[DriveName]) -> dict[DriveName, list[Envelope[Perceived]]]:
-    """What was told of each named drive when it was perceived last."""
+def _last_told(
+    log: EventLog, names: set[DriveName], kinds: Sequence[type]
+) -> dict[DriveName, list[Envelope[Perceived]]]:
+    """What was told of each named drive, of some kinds of events, under the boot that told of it last."""
     told: dict[DriveName, list[Envelope[Perceived]]] = {}
-    for row in log.read(PERCEIVED_STREAM, kinds=(LandmarksPerceived, OdometryMatched)):
+    for row in log.read(PERCEIVED_STREAM, kinds=kinds):
         envelope = cast(Envelope[Perceived], row.envelope)
         name = (envelope.event.vehicle, envelope.event.boot_id)
         if name not in names:
@@ -120,6 +128,23 @@ def _motion_series(matched: Iterable[tuple[int, OdometryMatched]]) -> MotionSeri
         stamp_ns=np.array([stamp_ns for stamp_ns, _ in rows], dtype=np.int64),
         motion=np.array([(event.x_m, event.y_m, event.heading_rad) for _, event in rows]),
         covariance=np.array([event.covariance for _, event in rows]),
+    )
+
+
+def _loop_series(told: Sequence[Envelope[Perceived]]) -> LoopSeries:
+    """Loops in order of time."""
+    rows = sorted(((row.stamp_ns, row.event) for row in told), key=lambda row: row[0])
+    closed = [(stamp_ns, event) for stamp_ns, event in rows if isinstance(event, LoopClosed)]
+    if not closed:
+        return NO_LOOPS
+    return LoopSeries(
+        other=tuple((event.other_vehicle, event.other_boot_id) for _, event in closed),
+        motions=MotionSeries(
+            from_stamp_ns=np.array([event.other_stamp_ns for _, event in closed], dtype=np.int64),
+            stamp_ns=np.array([stamp_ns for stamp_ns, _ in closed], dtype=np.int64),
+            motion=np.array([(event.x_m, event.y_m, event.heading_rad) for _, event in closed]),
+            covariance=np.array([event.covariance for _, event in closed]),
+        ),
     )
 
 

@@ -1,0 +1,1 @@
+"""Drives around a block that know again where they were."""
