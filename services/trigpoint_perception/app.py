@@ -13,7 +13,7 @@ from trigpoint.events.corrected import excluded_drives
 from trigpoint.events.envelope import Envelope
 from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.observed import Observed
-from trigpoint.events.perceived import LandmarksPerceived, Perceived
+from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched, SweepPerceived
 from trigpoint.events.scanned import PointsScanned
 from trigpoint.logs.ports import EventLog
 from trigpoint.logs.readings import Progress, in_silence, logged_corrections, vehicle_streams
@@ -25,6 +25,7 @@ from trigpoint_perception.core.publication import Said, numbered, output_boot_id
 from trigpoint_perception.settings import PerceptionSettings
 
 STREAM = STREAM_PATTERNS[LandmarksPerceived]
+SWEEP_KINDS = (LandmarksPerceived, OdometryMatched)  # what is told sweep by sweep
 KINDS = (PointsScanned, *MOTION_KINDS)
 APPENDED_TOGETHER = 200  # events
 
@@ -102,7 +103,7 @@ def told_of(
     drive: ScannedDrive,
     *,
     heard: Callable[[int], None] | None = None,
-) -> list[tuple[int, Perceived]]:
+) -> list[tuple[int, SweepPerceived]]:
     """Every event of a drive with its stamp; `heard` is told of each sweep."""
     log = open_log()
     try:
@@ -138,8 +139,8 @@ def sweep_counts(log: EventLog) -> Iterator[tuple[str, Mapping[tuple[str, str], 
 def said_of(log: EventLog) -> dict[str, Said]:
     """What perception has appended so far, by its own boots."""
     said: dict[str, Said] = {}
-    for logged in log.read(STREAM):
-        event = cast(Perceived, logged.envelope.event)
+    for logged in log.read(STREAM, kinds=SWEEP_KINDS):
+        event = cast(SweepPerceived, logged.envelope.event)
         said.setdefault(logged.envelope.identity.boot_id, Said()).add(event)
     return said
 
@@ -147,7 +148,7 @@ def said_of(log: EventLog) -> dict[str, Said]:
 def _appended(
     log: EventLog,
     drive: ScannedDrive,
-    told: Sequence[tuple[int, Perceived]],
+    told: Sequence[tuple[int, SweepPerceived]],
     before: Said,
     settings: PerceptionSettings,
 ) -> DriveReport:
@@ -163,14 +164,14 @@ def _appended(
     return _report(drive, whole, appended=max(0, len(told) - before.count))
 
 
-def _append(log: EventLog, told: Sequence[tuple[int, Perceived]], *, boot_id: str, first_sequence: int) -> None:
+def _append(log: EventLog, told: Sequence[tuple[int, SweepPerceived]], *, boot_id: str, first_sequence: int) -> None:
     rows = numbered(told, boot_id=boot_id, first_sequence=first_sequence)
     log.append(STREAM, cast(list[Envelope[Event]], list(rows)))
 
 
 def _told(
     log: EventLog, drive: ScannedDrive, settings: PerceptionSettings, heard: Callable[[int], None]
-) -> Iterator[tuple[int, Perceived]]:
+) -> Iterator[tuple[int, SweepPerceived]]:
     """Every event of a drive, in the order of its sweeps."""
     follower = DriveFollower(drive.vehicle, drive.boot_id, settings)
     for logged in log.read(drive.stream, kinds=KINDS):

@@ -206,8 +206,9 @@ def _append(log: EventLog, search: Search, found: Sequence[Attempt], told: _Told
         refused=tuple(RefusedLoops(reason=reason, count=count) for reason, count in sorted(refused.items())),
     )
     last_ns = max((int(run.stamp_ns[-1]) for run in search.runs), default=0)
+    new: list[tuple[int, LoopClosed | LoopsSought]] = [*fresh, (last_ns, sought)]
     rows = numbered(
-        [*fresh, (last_ns, sought)],
+        new,
         boot_id=closing_boot_id(*search.name, settings),
         first_sequence=len(told.closed) + len(told.searches),
     )

@@ -15,14 +15,14 @@ from trigpoint.events.codec import Event
 from trigpoint.events.envelope import Envelope
 from trigpoint.events.keys import DEFAULT_ROOT, KEY_VERSION, key_of
 from trigpoint.events.observed import Observed
-from trigpoint.events.perceived import LandmarksPerceived, Perceived
+from trigpoint.events.perceived import LandmarksPerceived, SweepPerceived
 from trigpoint.logs.checkpoints import write_checkpoint
 from trigpoint.logs.following import StreamFollower
 from trigpoint.logs.ports import EventLog
 from trigpoint.logs.readings import VEHICLE_PREFIX
 from trigpoint.observability.backlog import Backlog
 from trigpoint.observability.metrics import Instruments
-from trigpoint_perception.app import KINDS, STREAM, sweep_counts
+from trigpoint_perception.app import KINDS, STREAM, SWEEP_KINDS, sweep_counts
 from trigpoint_perception.checkpoint import Progress, read_progress
 from trigpoint_perception.core.fleet_following import KEPT_BOOTS, DriveName, FleetFollower, ToldOf
 from trigpoint_perception.core.publication import Spoken, output_boot_id, reason_of
@@ -72,8 +72,8 @@ class LivePerception:
         if self._checkpoint is not None:
             kept = read_progress(self._checkpoint, self._log, stream=STREAM, settings=self._settings)
         self._spoken = Spoken(kept.said if kept else {})
-        for logged in self._log.read(STREAM, first_number=kept.appended if kept else 0):
-            self._spoken.add(cast(Envelope[Perceived], logged.envelope))
+        for logged in self._log.read(STREAM, first_number=kept.appended if kept else 0, kinds=SWEEP_KINDS):
+            self._spoken.add(cast(Envelope[SweepPerceived], logged.envelope))
         self._fleet = kept.fleet if kept else FleetFollower(self._settings, ended=tuple(self._whole_drives()))
         taken = kept.taken if kept else {}
         self._streams = StreamFollower(self._log, _is_vehicle, checkpoint=taken, kinds=KINDS)
@@ -142,7 +142,7 @@ class LivePerception:
             self._bus.publish(event_message(cast(Envelope[Event], row), key=key_of(row, root=self._root)))
             self._count(row.event)
 
-    def _count(self, event: Perceived) -> None:
+    def _count(self, event: SweepPerceived) -> None:
         if isinstance(event, LandmarksPerceived) and event.refusal:
             self._instruments.rejected.labels(event.vehicle, reason_of(event.refusal)).inc()
         elif isinstance(event, LandmarksPerceived):

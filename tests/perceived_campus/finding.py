@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from trigpoint.events.drives import drives_of
-from trigpoint.events.perceived import LandmarksPerceived, Perceived
+from trigpoint.events.perceived import LandmarksPerceived, SweepPerceived
 from trigpoint_perception.core.following import NumberedSweep, SweepFollower
 from trigpoint_perception.core.motion_prior import wheel_path
 from trigpoint_perception.core.perceiving import CORNER, POLE
@@ -96,7 +96,7 @@ def perceived(scanned: ScannedCampus, drive: DriveScans) -> list[tuple[Landmarks
     (odometry,) = drives_of(scanned.campus.recordings[0].rows)
     follower = SweepFollower("veh", "boot", PerceptionSettings(), wheels=wheel_path(odometry))
     stamps = drive.stamp_ns()
-    told: list[tuple[int, Perceived]] = []
+    told: list[tuple[int, SweepPerceived]] = []
     for first in range(0, len(drive), SWEEPS_AT_ONCE):
         for number, event in enumerate(drive.events(first, min(first + SWEEPS_AT_ONCE, len(drive))), start=first):
             told += follower.take(NumberedSweep(sequence=number, stamp_ns=int(stamps[number]), scanned=event))

@@ -4,7 +4,7 @@ from collections import deque
 
 from trigpoint.events.envelope import Envelope
 from trigpoint.events.observed import Observed
-from trigpoint.events.perceived import LandmarksPerceived, Perceived
+from trigpoint.events.perceived import LandmarksPerceived, SweepPerceived
 from trigpoint.events.scanned import PointsScanned
 from trigpoint_perception.core.deskew import NS_PER_S
 from trigpoint_perception.core.following import NumberedSweep, SweepFollower
@@ -14,7 +14,7 @@ from trigpoint_perception.settings import PerceptionSettings
 HELD_NS = 500_000_000  # so far from the newest event's stamp a sweep does not wait for what reaches its end
 HELD_SWEEPS = 8  # nor behind so many others
 
-Told = tuple[int, Perceived]
+Told = tuple[int, SweepPerceived]
 
 
 class DriveFollower:

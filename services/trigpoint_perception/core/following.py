@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from trigpoint.errors import EventRejected
-from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched, Perceived, PerceivedLandmark
+from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched, PerceivedLandmark, SweepPerceived
 from trigpoint.events.scanned import PointsScanned
 from trigpoint_perception.core.deskew import NS_PER_S, Path, deskewed, poses_at
 from trigpoint_perception.core.odometry import (
@@ -83,9 +83,9 @@ class SweepFollower:
         """From now on the base moves by this path, None: as it moved before."""
         self._wheels = wheels
 
-    def take(self, numbered: NumberedSweep) -> tuple[tuple[int, Perceived], ...]:
+    def take(self, numbered: NumberedSweep) -> tuple[tuple[int, SweepPerceived], ...]:
         """Events with their stamps that are certain after one more sweep, those of earlier sweeps first."""
-        restarted: tuple[tuple[int, Perceived], ...] = ()
+        restarted: tuple[tuple[int, SweepPerceived], ...] = ()
         self._number += 1
         if self._is_apart(numbered.stamp_ns):
             restarted = self._restarted()
@@ -96,7 +96,7 @@ class SweepFollower:
         ready = len(self._waiting) - self._settings.track.window + 1
         return (*restarted, *(each for _ in range(ready) for each in self._told(self._waiting.popleft())))
 
-    def finished(self) -> tuple[tuple[int, Perceived], ...]:
+    def finished(self) -> tuple[tuple[int, SweepPerceived], ...]:
         """The events of the sweeps that still waited."""
         told = tuple(each for waiting in self._waiting for each in self._told(waiting))
         self._waiting.clear()
@@ -109,7 +109,7 @@ class SweepFollower:
         gap_s = (stamp_ns - self._last.stamp_ns) / NS_PER_S
         return not 0.0 < gap_s <= self._settings.odometry.gap_max_s
 
-    def _restarted(self) -> tuple[tuple[int, Perceived], ...]:
+    def _restarted(self) -> tuple[tuple[int, SweepPerceived], ...]:
         told = self.finished()
         self._odometry = LidarOdometry(self._settings.odometry)
         self._tracks = Tracks(next_number=self._tracks.next_number)
@@ -121,9 +121,7 @@ class SweepFollower:
         """One sweep searched, matched and tracked. Raises EventRejected where it is not usable."""
         sweep = self._still(usable_sweep(numbered.scanned, self._settings.sweep), numbered.stamp_ns)
         sights = sights_of(sweep, self._settings)
-        placed = self._placed(
-            numbered, sweep, self._odometry.matched(sweep.point_m, self._expected(numbered.stamp_ns))
-        )
+        placed = self._placed(numbered, sweep, self._odometry.matched(sweep.point_m, self._expected(numbered.stamp_ns)))
         match = placed.match
         odometry = self._odometry_event(numbered, match)
         self._last = placed
@@ -213,7 +211,7 @@ class SweepFollower:
             matched_share=match.matched_share,
         )
 
-    def _told(self, waiting: _Waiting) -> tuple[tuple[int, Perceived], ...]:
+    def _told(self, waiting: _Waiting) -> tuple[tuple[int, SweepPerceived], ...]:
         counting = {track.number: track for track in self._tracks.tracks if track.confirmed}
         landmarks = tuple(
             _landmark(sight, counting[number])

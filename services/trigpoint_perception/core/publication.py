@@ -3,12 +3,15 @@
 import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 from trigpoint.events.envelope import Envelope, EventIdentity
-from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched, Perceived
+from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched, Perceived, SweepPerceived
 from trigpoint_perception.settings import PerceptionSettings
 
 SOURCE = "perception"
+
+One = TypeVar("One", bound=Perceived)
 
 
 def output_boot_id(vehicle: str, boot_id: str, settings: PerceptionSettings) -> str:
@@ -17,9 +20,7 @@ def output_boot_id(vehicle: str, boot_id: str, settings: PerceptionSettings) -> 
     return f"{vehicle[:40]}-{digest}"
 
 
-def numbered(
-    told: Iterable[tuple[int, Perceived]], *, boot_id: str, first_sequence: int
-) -> tuple[Envelope[Perceived], ...]:
+def numbered(told: Iterable[tuple[int, One]], *, boot_id: str, first_sequence: int) -> tuple[Envelope[One], ...]:
     """Events with their stamps as envelopes, numbered on from `first_sequence`."""
     return tuple(
         Envelope(EventIdentity(SOURCE, boot_id, first_sequence + number), stamp_ns, event)
@@ -44,7 +45,7 @@ class Said:
     refused: dict[str, int] = field(default_factory=dict)
     things: set[tuple[str, str, int]] = field(default_factory=set)
 
-    def add(self, event: Perceived) -> None:
+    def add(self, event: SweepPerceived) -> None:
         """Take one more event into account."""
         self.count += 1
         if isinstance(event, OdometryMatched):
@@ -82,7 +83,7 @@ class Spoken:
         """How many events there are of each boot."""
         return dict(self._counts)
 
-    def add(self, row: Envelope[Perceived]) -> None:
+    def add(self, row: Envelope[SweepPerceived]) -> None:
         """One that is in the log and may be told of again."""
         boot_id = row.identity.boot_id
         self._counts[boot_id] = max(self._counts.get(boot_id, 0), row.identity.sequence + 1)
@@ -96,7 +97,9 @@ class Spoken:
         """A boot of which nothing is told again."""
         self._there.pop(boot_id, None)
 
-    def fresh(self, told: Iterable[tuple[int, Perceived]], *, boot_id: str) -> tuple[Envelope[Perceived], ...]:
+    def fresh(
+        self, told: Iterable[tuple[int, SweepPerceived]], *, boot_id: str
+    ) -> tuple[Envelope[SweepPerceived], ...]:
         """Those of the events that are not in the log, with their stamps and numbered on; they count as there."""
         there = self._there.get(boot_id, set())
         new = []

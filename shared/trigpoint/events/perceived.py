@@ -119,4 +119,5 @@ class LoopsSought:
     refused: tuple[RefusedLoops, ...]
 
 
-Perceived = LandmarksPerceived | OdometryMatched | LoopClosed | LoopsSought
+SweepPerceived = LandmarksPerceived | OdometryMatched  # told sweep by sweep
+Perceived = SweepPerceived | LoopClosed | LoopsSought

@@ -8,7 +8,7 @@ import pytest
 
 from scanned_worlds.casting import PERIOD_NS, SIXTEEN, SIXTY_FOUR, START_NS, STREET, World, driven_pose, swept
 from trigpoint.errors import EventRejected
-from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched, Perceived
+from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched, SweepPerceived
 from trigpoint.events.scanned import PointsScanned
 from trigpoint_perception.core.deskew import deskewed, planar_path
 from trigpoint_perception.core.following import NumberedSweep, SweepFollower
@@ -35,7 +35,7 @@ def drive(count: int, *, world: World = STREET) -> list[NumberedSweep]:
 
 def told(sweeps: Sequence[NumberedSweep], **options: object) -> tuple[list[LandmarksPerceived], list[OdometryMatched]]:
     follower = SweepFollower("van", "boot-1", SETTINGS, **options)  # type: ignore[arg-type]
-    events: list[Perceived] = [event for sweep in sweeps for _, event in follower.take(sweep)]
+    events: list[SweepPerceived] = [event for sweep in sweeps for _, event in follower.take(sweep)]
     events += [event for _, event in follower.finished()]
     landmarks = [event for event in events if isinstance(event, LandmarksPerceived)]
     return landmarks, [event for event in events if isinstance(event, OdometryMatched)]

@@ -12,7 +12,8 @@ from trigpoint_perception.core.closures.settings import VerificationSettings
 from trigpoint_perception.core.deskew import deskewed, planar_path
 from trigpoint_perception.core.following import NumberedSweep
 from trigpoint_perception.core.ground import heights_above_ground
-from trigpoint_perception.core.odometry import NEIGHBOURS, LidarOdometry
+from trigpoint_perception.core.kept_map import NEIGHBOURS
+from trigpoint_perception.core.odometry import LidarOdometry
 from trigpoint_perception.core.sweep import Sweep, usable_sweep
 from trigpoint_perception.settings import PerceptionSettings
 
