@@ -11,7 +11,9 @@ import numpy as np
 from figures.figure import Bounds, Figure, Measurement, at_least, at_most
 from figures.workbench import Workbench
 from looped_worlds.judging import JudgedLoops, judged_loops
+from looped_worlds.without_landmarks import Solve, solve_without_landmarks
 from trigpoint.logs.mcap_log import McapLog
+from trigpoint.logs.readings import logged_drives, logged_frame
 from trigpoint.workers import workers
 from trigpoint_ingest.recorded import ingest_logs
 from trigpoint_perception.app import perceive_log
@@ -23,6 +25,7 @@ from trigpoint_vehicle.core.lidar.scanned_campus import conversion_with_points, 
 from trigpoint_vehicle.core.lidar_settings import CarriedLidar
 
 SEED = 3
+WRONG_SHARE = 0.3
 # Of its 4.9 km some 0.9 km are driven again by the same vehicle the other way, 0.9 km by the other the same way, and
 # 1.8 km by the other the other way.
 DRIVES = CampusSettings(vehicles=2, route=RouteSettings(length_min_m=1950.0, length_max_m=2800.0, coverage_min=0.2))
@@ -31,11 +34,15 @@ COMMAND = f"trigpoint perceive  # campus {SEED}, two vehicles on loops of 2 to 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Closed:
-    """What was closed: the drives' reports, loops against the truth, and processor time over the drives' duration."""
+    """What was closed: the drives' reports, loops against the truth, and processor time over the drives' duration; and
+    the drives solved for without landmarks: without loops, with them, and with some of these wrong."""
 
     reports: tuple[LoopReport, ...]
     judged: JudgedLoops
     time_share: float
+    apart: Solve
+    together: Solve
+    misled: Solve
 
     @property
     def proposed(self) -> int:
@@ -64,11 +71,19 @@ def closed(folder: Path) -> Closed:
             began_s = time.process_time()
             reports = close_loops(log, open_log, some=some)
             took_s = time.process_time() - began_s
-        judged = judged_loops(log, written.truth)
+        judged, drives = judged_loops(log, written.truth), logged_drives(log)
+        solve = partial(solve_without_landmarks, drives, logged_frame(log), written.truth)
     finally:
         log.close()
     driven_s = sum(float(motion.time_s[-1]) for motion in campus.motions)
-    return Closed(reports=reports, judged=judged, time_share=took_s / driven_s)
+    return Closed(
+        reports=reports,
+        judged=judged,
+        time_share=took_s / driven_s,
+        apart=solve(with_loops=False),
+        together=solve(with_loops=True),
+        misled=solve(with_loops=True, wrong_share=WRONG_SHARE),
+    )
 
 
 def of_loops(bench: Workbench, *, value: Callable[[Closed], float]) -> Measurement:
@@ -88,5 +103,16 @@ FIGURES = (
     _figure("the same, error, p95", "m", None, lambda found: np.quantile(found.judged.error_m, 0.95)),
     _figure("the same, error, largest", "m", None, lambda found: found.judged.error_m.max()),
     _figure("the same, NEES over 3", "1", at_most(1.5), lambda found: found.judged.nees.mean() / 3.0),
+    _figure("without landmarks, no loops: one drive off the other", "m", None, lambda found: found.apart.apart_m),
+    _figure("the same, error of the paths", "m", None, lambda found: found.apart.path_m),
+    _figure("with half the loops, off at the other half", "m", at_most(0.2), lambda found: found.together.apart_m),
+    _figure("the same, error of the paths", "m", None, lambda found: found.together.path_m),
+    _figure("30 % of the loops wrong, off at the other half", "m", at_most(0.2), lambda found: found.misled.apart_m),
+    _figure(
+        "the same, error of the paths over that with right ones",
+        "1",
+        at_most(1.1),
+        lambda found: found.misled.path_m / found.together.path_m,
+    ),
     _figure("loops, processor time over the drives'", "1", at_most(0.5), lambda found: found.time_share),
 )

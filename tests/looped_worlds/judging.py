@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trigpoint.events.perceived import LoopClosed
-from trigpoint.events.truth import Truth, TruthPath
+from trigpoint.events.truth import TruthPath
 from trigpoint.geodesy.poses import wrap_angles_rad
 from trigpoint.geodesy.projection import MapFrame, map_points_from_wgs84
 from trigpoint.logs.ports import EventLog
@@ -18,6 +18,7 @@ from trigpoint_optimisation.core.odometry import relative_poses
 from trigpoint_perception.app import STREAM
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 WRONG_M, WRONG_RAD = 0.5, np.radians(2.0)
 
@@ -41,16 +42,30 @@ class JudgedLoops:
         return int(((self.error_m > WRONG_M) | (np.abs(self.error[:, 2]) > WRONG_RAD)).sum())
 
 
+class TruePaths:
+    """The true poses of vehicles, in a map's frame."""
+
+    def __init__(self, truth_file: Path, frame: MapFrame) -> None:
+        self._paths = {path.vehicle: path for path in read_truth(truth_file).paths}
+        self._poses = {vehicle: _poses(path, frame) for vehicle, path in self._paths.items()}
+
+    def at(self, vehicle: str, stamp_ns: Ints) -> Floats:
+        """True poses (n, 3) at stamps: x, y in map metres, heading in rad, without jumps."""
+        path = self._paths[vehicle]
+        at_s, wanted_s = ((each - path.stamp_ns[0]) * 1e-9 for each in (path.stamp_ns, stamp_ns))
+        return np.column_stack([np.interp(wanted_s, at_s, column) for column in self._poses[vehicle].T])
+
+
 def judged_loops(log: EventLog, truth_file: Path) -> JudgedLoops:
     """Every loop in a log against the true poses of both its sweeps."""
-    frame, truth = logged_frame(log), read_truth(truth_file)
-    paths = {path.vehicle: _poses(path, frame) for path in truth.paths}
+    frame = logged_frame(log)
+    paths, scale = TruePaths(truth_file, frame), (frame.point_scale, frame.point_scale, 1.0)
     errors, nees = [], []
     for logged in log.read(STREAM, kinds=(LoopClosed,)):
         loop = cast(LoopClosed, logged.envelope.event)
-        other = _at(truth, paths, loop.other_vehicle, loop.other_stamp_ns)
-        one = _at(truth, paths, loop.vehicle, logged.envelope.stamp_ns)
-        error = np.array([loop.x_m, loop.y_m, loop.heading_rad]) - relative_poses(other, one)[0]
+        other = paths.at(loop.other_vehicle, np.array([loop.other_stamp_ns]))
+        one = paths.at(loop.vehicle, np.array([logged.envelope.stamp_ns]))
+        error = np.array([loop.x_m, loop.y_m, loop.heading_rad]) - relative_poses(other, one)[0] / scale
         error[2] = wrap_angles_rad(error[2:])[0]
         errors.append(error)
         nees.append(error @ np.linalg.solve(loop.covariance, error))
@@ -58,14 +73,5 @@ def judged_loops(log: EventLog, truth_file: Path) -> JudgedLoops:
 
 
 def _poses(path: TruthPath, frame: MapFrame) -> Floats:
-    """Poses (n, 3) in metres over the ground, headings without jumps."""
-    point_m = map_points_from_wgs84(path.lat_deg, path.lon_deg, frame) / frame.point_scale
+    point_m = map_points_from_wgs84(path.lat_deg, path.lon_deg, frame)
     return np.column_stack([point_m, np.unwrap(path.heading_rad)])
-
-
-def _at(truth: Truth, paths: dict[str, Floats], vehicle: str, stamp_ns: int) -> Floats:
-    """The true pose (1, 3) of a vehicle at a stamp."""
-    (path,) = (each for each in truth.paths if each.vehicle == vehicle)
-    at_s = (path.stamp_ns - path.stamp_ns[0]) * 1e-9
-    wanted_s = (stamp_ns - int(path.stamp_ns[0])) * 1e-9
-    return np.array([[np.interp(wanted_s, at_s, column) for column in paths[vehicle].T]])
