@@ -98,7 +98,7 @@ FLOWS: tuple[Flow, ...] = (
     Flow(PoseFiltered, FILTERING, (EVALUATION,)),
     Flow(GateAlarmed, FILTERING, (EVALUATION,)),
     Flow(LandmarksPerceived, PERCEPTION, (OPTIMISATION, EVALUATION)),
-    Flow(OdometryMatched, PERCEPTION, ()),
+    Flow(OdometryMatched, PERCEPTION, (OPTIMISATION,)),
     Flow(TrajectorySolved, OPTIMISATION, (LANDMARKS, EVALUATION, TILES)),
     Flow(LandmarkSolved, OPTIMISATION, (LANDMARKS, EVALUATION)),
     Flow(AnchorAssociated, OPTIMISATION, (LANDMARKS, EVALUATION)),

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from trigpoint.geodesy.poses import transform_points
 from trigpoint_optimisation.core.detection_noise import DetectionNoise
 from trigpoint_optimisation.core.preparation import PreparedDrive, detected_points
-from trigpoint_optimisation.core.state import RANGE_OFFSETS
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
