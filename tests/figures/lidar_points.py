@@ -10,6 +10,7 @@ import numpy as np
 from figures.figure import Bounds, Figure, Measurement, at_most
 from figures.lidar_campus import DRIVE, SEED
 from figures.workbench import Outcome, Workbench
+from perceived_campus.sights import SightErrors, sight_errors
 from trigpoint.events.truth import truth_from_lines
 from trigpoint.geodesy.projection import map_points_from_wgs84
 from trigpoint.logs.mcap_log import McapLog
@@ -103,6 +104,39 @@ def of_demo(bench: Workbench, *, path: str) -> Measurement:
     return Measurement(value=outcome.at(path), command=outcome.command)
 
 
+@cache
+def sights_of(data: Path, truth: Path, kind: str) -> SightErrors:
+    """The errors of the first vehicle's sights of one kind."""
+    log = McapLog(data / "log")
+    with truth.open(encoding="utf-8") as lines:
+        return sight_errors(logged_drives(log)[0], truth_from_lines(lines), logged_frame(log), kind=kind)
+
+
+def of_sights(bench: Workbench, *, kind: str, value: Callable[[SightErrors], float]) -> Measurement:
+    """A number of the sights of one kind."""
+    whole = mapped(bench)
+    measured = value(sights_of(whole.data, whole.truth, kind))
+    return Measurement(value=measured, command=f"figures.lidar_points.sights_of  # {kind}")
+
+
+def _sights(kind: str) -> tuple[Figure, ...]:
+    rows: tuple[tuple[str, str, Callable[[SightErrors], float]], ...] = (
+        ("NEES per degree of freedom", "1", lambda sights: sights.nees_per_dof),
+        ("inside their 95 % ellipses", "1", lambda sights: sights.inside_95),
+        ("too far by, mean", "m", lambda sights: float(sights.too_far_m.mean())),
+        ("correlation of that 4 s apart", "1", lambda sights: sights.lasting),
+    )
+    return tuple(
+        Figure(
+            name=f"the same, sights of a {kind}, {text}",
+            unit=unit,
+            target=None,
+            measure=partial(of_sights, kind=kind, value=value),
+        )
+        for text, unit, value in rows
+    )
+
+
 def _figures(name: str, measure: Callable[..., Measurement], *, target: Bounds | None) -> tuple[Figure, ...]:
     """The errors of one map against truth, and whether its uncertainty is true."""
     rows = (
@@ -141,6 +175,8 @@ def _variant(variant: str) -> tuple[Figure, ...]:
 FIGURES = (
     *_figures("campus end to end from points only, landmark truth error, mean", of_map, target=at_most(0.35)),
     *(figure for variant in VARIANTS for figure in _variant(variant)),
+    *_sights("pole"),
+    *_sights("corner"),
 )
 DEMO_FIGURES = _figures(
     "whole demonstration from points only, landmark truth error, mean", of_demo, target=at_most(0.35)
