@@ -79,6 +79,7 @@ class CalibrationPriors:
     turn_bias_sampled_radpm: float = 0.03  # 1.7 % between the radii of wheels 0.57 m apart
     delay_sampled_s: float = 0.30  # a sample a second says when to within its period / sqrt(12)
     delay_camera_s: float = 0.30  # images are worked on before they are stamped
+    range_offset_m: float = 0.03  # a point lies on a thing's near side, its axis beyond
     camera_range: float = 0.02  # ln range, averaged over the drive's own bearings
     camera_range_per_rad: float = 0.05
     camera_range_per_rad2: float = 0.5  # a camera sees depth: ln cos(bearing) is -bearing^2 / 2
@@ -146,7 +147,7 @@ class MatchedSettings:
     """How motions found by matching points, lidar odometry, enter the graph beside wheels and IMU."""
 
     used: bool = True
-    inflation: float = 1.0  # of their covariance
+    covariance_factor: float = 0.25  # of a motion over a keyframe: its sum counts every sweep between the ends twice
     kernel: Kernel = Kernel("dcs", 2.0)
 
 

@@ -133,6 +133,37 @@ def anchor_factor(keys: tuple[int, ...], label_m: Floats, *, noise: gtsam.noiseM
     return gtsam.CustomFactor(noise, list(keys), error)
 
 
+def point_factor(
+    keys: tuple[int, int, int], point_m: Floats, *, by_offset: Floats, noise: gtsam.noiseModel.Base
+) -> gtsam.CustomFactor:
+    """A point (2,) as seen in the frame of keyframe keys[0], against where the point keys[2] (2,) is in the map.
+
+    keys[1] (k,) is what perception is off by in all its sights; by_offset (2, k) moves the seen point by it. Residual:
+    x and y in m in the keyframe's frame. In plain numbers, not arrays: there are tens of thousands of these.
+    """
+    seen_x, seen_y = point_m.tolist()
+    by_x, by_y = by_offset.tolist()
+
+    def error(_: gtsam.CustomFactor, values: gtsam.Values, jacobians: Jacobians) -> Floats:
+        pose = values.atPose2(keys[0])
+        x, y = values.atPoint2(keys[2]).tolist()
+        heading = pose.theta()
+        c, s = math.cos(heading), math.sin(heading)
+        east, north = x - pose.x(), y - pose.y()
+        ahead, left = c * east + s * north, c * north - s * east
+        if jacobians is not None:
+            jacobians[0] = np.array(((-1.0, 0.0, left), (0.0, -1.0, -ahead)))
+            jacobians[1] = by_offset
+            jacobians[2] = np.array(((c, s), (-s, c)))
+        offset = values.atVector(keys[1]).tolist()
+        for k, value in enumerate(offset):
+            ahead += by_x[k] * value
+            left += by_y[k] * value
+        return np.array((ahead - seen_x, left - seen_y))
+
+    return gtsam.CustomFactor(noise, list(keys), error)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measured:
     """One sighting: ln_range of what the sensor said in map metres, its bearing, and the bearing squared less the

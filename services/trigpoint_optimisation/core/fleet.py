@@ -21,7 +21,7 @@ from trigpoint_optimisation.core.relative_poses import (
     add_relative_poses,
     between_keyframes,
     hung_motions,
-    widened,
+    scaled,
 )
 from trigpoint_optimisation.core.sightings import keyframe_points
 from trigpoint_optimisation.core.state import DriveState, MapState, shared_keys, state_of, values_of
@@ -149,7 +149,7 @@ def motion_graph(fleet: Fleet) -> gtsam.NonlinearFactorGraph:
     for each in fleet.prepared if matched.used else ():
         motions = between_keyframes(each, each.drive.matched)
         relative = hung_motions(each, each, motions, point_scale=scale)
-        add_relative_poses(graph, widened(relative, matched.inflation), kernel=matched.kernel)
+        add_relative_poses(graph, scaled(relative, matched.covariance_factor), kernel=matched.kernel)
     add_loops(graph, fleet.prepared, fleet.settings.loops, point_scale=scale)
     return graph
 

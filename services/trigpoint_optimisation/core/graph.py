@@ -14,6 +14,7 @@ from trigpoint_optimisation.core.factors import (
     decay_factor,
     fix_factor,
     odometry_factor,
+    point_factor,
     sighting_factor,
 )
 from trigpoint_optimisation.core.odometry import OdometryCalibration, TurnSource
@@ -21,11 +22,13 @@ from trigpoint_optimisation.core.preparation import PreparedDrive
 from trigpoint_optimisation.core.sightings import Sightings
 from trigpoint_optimisation.core.single_sightings import SingleSightings
 from trigpoint_optimisation.core.state import (
+    RANGE_OFFSETS,
     antenna_key,
     fix_bias_key,
     image_key,
     landmark_key,
     pose_key,
+    range_offset_key,
     scale_key,
     sensor_key,
     track_key,
@@ -138,6 +141,8 @@ def add_calibration_priors(
     graph.add(gtsam.PriorFactorVector(scale_key(d), np.array([point_scale, 1.0, 0.0]), diagonal(sigmas)))
     graph.add(gtsam.PriorFactorVector(antenna_key(d), arm_m, diagonal(np.full(2, priors.antenna_m))))
     graph.add(gtsam.PriorFactorVector(sensor_key(d), np.zeros(6), diagonal(sensor_sigmas(prepared, priors))))
+    offset = gtsam.noiseModel.Isotropic.Sigma(RANGE_OFFSETS, priors.range_offset_m)
+    graph.add(gtsam.PriorFactorVector(range_offset_key(d), np.zeros(RANGE_OFFSETS), offset))
     graph.add(gtsam.PriorFactorVector(turn_bias_key(d, 0), np.zeros(1), diagonal(np.array([turn_bias]))))
     by_imu = prepared.source is TurnSource.IMU
     fraction = priors.turn_bias_walk_fraction_imu if by_imu else priors.turn_bias_walk_fraction
@@ -199,7 +204,8 @@ def add_sightings(
 ) -> None:
     """Bearing and range from keyframe to landmark; `landmark` (s,) by sighting, negative ones left out.
 
-    Sightings that share an error are of their track's own point, which is off the landmark by that error.
+    Those of perceived landmarks are of their track's own point, which is off the landmark by the error they share, and
+    as far off in range as their drive's offset says.
     """
     x, y = sightings.point_m.T
     range_m = np.hypot(x, y)
@@ -208,11 +214,15 @@ def add_sightings(
     covariance = to_polar @ sightings.covariance @ to_polar.transpose(0, 2, 1)
     bearing = np.arctan2(y, x)
     for row in rows:
+        d, pose = int(sightings.drive[row]), pose_key(int(sightings.drive[row]), int(sightings.keyframe[row]))
+        if sightings.shared_m2[row] > 0.0:
+            noise = with_kernel(gtsam.noiseModel.Gaussian.Covariance(sightings.covariance[row]), kernel)
+            keys = pose, range_offset_key(d), track_key(int(sightings.track[row]))
+            graph.add(point_factor(keys, sightings.point_m[row], by_offset=sightings.by_offset[row], noise=noise))
+            continue
         noise = with_kernel(gtsam.noiseModel.Gaussian.Covariance(covariance[row]), kernel)
-        shared = sightings.shared_m2[row] > 0.0
-        seen = track_key(int(sightings.track[row])) if shared else landmark_key(int(landmark[row]))
-        keys = pose_key(int(sightings.drive[row]), int(sightings.keyframe[row])), seen
-        graph.add(gtsam.BearingRangeFactor2D(*keys, gtsam.Rot2(bearing[row]), range_m[row], noise))
+        seen = landmark_key(int(landmark[row]))
+        graph.add(gtsam.BearingRangeFactor2D(pose, seen, gtsam.Rot2(bearing[row]), range_m[row], noise))
     _add_shared_errors(graph, sightings, landmark, kernel=kernel)
 
 

@@ -85,9 +85,9 @@ def _rotations(angle_rad: Floats) -> Floats:
     return np.stack([c, -s, zero, s, c, zero, zero, zero, one], axis=-1).reshape(-1, 3, 3)
 
 
-def widened(relative: RelativePoses, inflation: float) -> RelativePoses:
+def scaled(relative: RelativePoses, factor: float) -> RelativePoses:
     """The relative poses with their covariances multiplied."""
-    return replace(relative, covariance=inflation * relative.covariance)
+    return replace(relative, covariance=factor * relative.covariance)
 
 
 def add_relative_poses(graph: gtsam.NonlinearFactorGraph, relative: RelativePoses, *, kernel: Kernel | None) -> None:

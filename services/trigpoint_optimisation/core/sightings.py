@@ -13,11 +13,14 @@ from trigpoint_optimisation.core.preparation import PreparedDrive, detected_poin
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+CORNER = "corner"  # kind of a detection
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sightings:
     """Sightings (s,): drive, keyframe, track; point_m (s, 2) in the keyframe's base frame; covariance (s, 2, 2) of what
-    is a sighting's own error; shared_m2 (s,): variance per axis of the error that all of a track's have in common."""
+    is a sighting's own error; shared_m2 (s,): variance per axis of the error that all of a track's have in common;
+    by_offset (s, 2, 2): how the point moves by the drive's range offsets, see `DriveState`."""
 
     drive: Ints
     keyframe: Ints
@@ -25,6 +28,7 @@ class Sightings:
     point_m: Floats
     covariance: Floats
     shared_m2: Floats
+    by_offset: Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,6 +72,17 @@ def perceived_covariances(prepared: PreparedDrive) -> Floats:
     return turned
 
 
+def _by_offset(prepared: PreparedDrive) -> Floats:
+    """How detected points move in their keyframes' frames by the drive's range offsets (d, 2, 2): along their rays."""
+    detections, described = prepared.drive.detections, prepared.drive.described
+    angle = detections.bearing_rad + described.landmark_sensor_yaw_rad + prepared.detection_offset[:, 2]
+    corner = np.array([float(kind == CORNER) for kind in detections.kind])
+    of_kind = np.column_stack([1.0 - corner, corner])
+    ray: Floats = np.column_stack([np.cos(angle), np.sin(angle)])
+    by_offset: Floats = np.einsum("da,dk->dak", ray, of_kind)
+    return by_offset
+
+
 def drive_sightings(prepared: PreparedDrive, track: Ints, averaging: Averaging) -> Sightings:
     """One sighting for each track and keyframe of a drive; `track` (d,) by detection, negative where none.
 
@@ -79,24 +94,29 @@ def drive_sightings(prepared: PreparedDrive, track: Ints, averaging: Averaging) 
     unique, group = np.unique(names, axis=0, return_inverse=True)
     count = np.bincount(group, minlength=len(unique)).astype(np.float64)
     own = perceived_covariances(prepared)[rows]
-    told = np.isfinite(own).all(axis=(1, 2))
-    variances = np.where(told[:, None, None], own, _detection_covariances(prepared, averaging.noise)[rows])
-    point, covariance = np.zeros((len(unique), 2)), np.zeros((len(unique), 2, 2))
-    np.add.at(point, group, keyframe_points(prepared, point_scale=averaging.point_scale)[rows])
-    np.add.at(covariance, group, variances)
-    mean = covariance / count[:, None, None]
-    by_perception = np.bincount(group, weights=told, minlength=len(unique)) > 0
-    shared_m2 = np.where(by_perception, averaging.shared_share * 0.5 * np.trace(mean, axis1=1, axis2=2), 0.0)
-    common_m2 = np.where(by_perception, 0.0, averaging.noise.common_sigma_m**2) + averaging.slack_m**2
-    divided = np.where(by_perception, 1.0 / (1.0 - averaging.shared_share), count)
+    untold = np.isnan(own).any(axis=(1, 2))
+    own[untold] = _detection_covariances(prepared, averaging.noise)[rows[untold]]
+    mean = _means(own, group, count)
+    told = np.bincount(group, weights=~untold, minlength=len(unique)) > 0
+    share = np.where(told, averaging.shared_share, 0.0)
+    alone = np.where(told, 1.0 - share, 1.0 / np.maximum(count, 1.0))
+    common_m2 = np.where(told, 0.0, averaging.noise.common_sigma_m**2) + averaging.slack_m**2
     return Sightings(
         drive=np.full(len(unique), prepared.index, dtype=np.int64),
         keyframe=unique[:, 1],
         track=unique[:, 0],
-        point_m=point / count[:, None],
-        covariance=mean / divided[:, None, None] + common_m2[:, None, None] * np.eye(2),
-        shared_m2=shared_m2,
+        point_m=_means(keyframe_points(prepared, point_scale=averaging.point_scale)[rows], group, count),
+        covariance=alone[:, None, None] * mean + common_m2[:, None, None] * np.eye(2),
+        shared_m2=share * 0.5 * np.trace(mean, axis1=1, axis2=2),
+        by_offset=_means(_by_offset(prepared)[rows], group, count),
     )
+
+
+def _means(values: Floats, group: Ints, count: Floats) -> Floats:
+    """The mean (g, ...) of the values (n, ...) of each group (n,), `count` (g,) of them."""
+    total = np.zeros((len(count), *values.shape[1:]))
+    np.add.at(total, group, values)
+    return total / count.reshape(-1, *[1] * (values.ndim - 1))
 
 
 def joined(parts: Sequence[Sightings]) -> Sightings:
@@ -108,4 +128,5 @@ def joined(parts: Sequence[Sightings]) -> Sightings:
         point_m=np.concatenate([part.point_m for part in parts]),
         covariance=np.concatenate([part.covariance for part in parts]),
         shared_m2=np.concatenate([part.shared_m2 for part in parts]),
+        by_offset=np.concatenate([part.by_offset for part in parts]),
     )

@@ -57,7 +57,13 @@ def sensor_key(drive: int) -> int:
     return int(gtsam.symbol("s", drive))
 
 
-SHARED_KINDS = frozenset("cabos")
+def range_offset_key(drive: int) -> int:
+    """Range offsets (2,) in m of what a drive's points show, by RANGE_OFFSETS."""
+    return int(gtsam.symbol("r", drive))
+
+
+RANGE_OFFSETS = 2  # of poles, whose axes points only see from outside, and of corners
+SHARED_KINDS = frozenset("cabors")
 
 
 def shared_keys(values: gtsam.Values) -> list[int]:
@@ -69,7 +75,8 @@ def shared_keys(values: gtsam.Values) -> list[int]:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DriveState:
     """One drive's states. pose (n, 3); scale (3,); turn_bias (m,); antenna_m (2,); fix_bias_m (g, 2);
-    sensor (6,), zero for a sensor that needs no calibration."""
+    sensor (6,), zero for a sensor that needs no calibration; range_offset_m (2,), how much too far poles and corners
+    found in points seem."""
 
     pose: Floats
     scale: Floats
@@ -77,6 +84,7 @@ class DriveState:
     antenna_m: Floats
     fix_bias_m: Floats
     sensor: Floats
+    range_offset_m: Floats = field(default_factory=lambda: np.zeros(RANGE_OFFSETS))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,6 +107,7 @@ def values_of(state: MapState) -> gtsam.Values:
         values.insert(scale_key(d), drive.scale)
         values.insert(antenna_key(d), drive.antenna_m)
         values.insert(sensor_key(d), drive.sensor)
+        values.insert(range_offset_key(d), drive.range_offset_m)
         for k, bias in enumerate(drive.turn_bias):
             values.insert(turn_bias_key(d, k), np.array([bias]))
         for k, fix_bias in enumerate(drive.fix_bias_m):
@@ -125,6 +134,7 @@ def _drive_state(values: gtsam.Values, d: int, like: DriveState) -> DriveState:
         antenna_m=values.atVector(antenna_key(d)),
         fix_bias_m=_vectors(values, [fix_bias_key(d, k) for k in range(len(like.fix_bias_m))], 2),
         sensor=values.atVector(sensor_key(d)),
+        range_offset_m=values.atVector(range_offset_key(d)),
     )
 
 

@@ -187,6 +187,7 @@ def sighted(point_m: Floats, *, sigma_m: float) -> Sightings:
         point_m=point_m[None, :],
         covariance=sigma_m**2 * np.eye(2)[None],
         shared_m2=np.zeros(1),
+        by_offset=np.zeros((1, 2, 2)),
     )
 
 

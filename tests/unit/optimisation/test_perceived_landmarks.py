@@ -22,7 +22,8 @@ from trigpoint_optimisation.app import build, input_positions
 from trigpoint_optimisation.settings import OdometrySettings, SolveSettings
 
 SETTINGS = SolveSettings(method="anchored", odometry=OdometrySettings(keyframe_m=4.0))  # coarse: quick
-SAME_M = 1e-6  # there and back through the base frame
+VARIANCE_M2 = 0.1**2  # of a sight, per axis, as perception tells it
+SIGHT_M = 0.1  # its sigma: sights weighed otherwise move a landmark by less
 
 
 @pytest.fixture(scope="module")
@@ -76,13 +77,18 @@ def in_base(seen: LandmarkDetection, described: VehicleDescribed) -> PerceivedLa
         track=0,
         x_m=described.landmark_sensor_x_m + seen.range_m * math.cos(angle_rad),
         y_m=described.landmark_sensor_y_m + seen.range_m * math.sin(angle_rad),
-        variance_x_m2=0.01,
+        variance_x_m2=VARIANCE_M2,
         covariance_xy_m2=0.0,
-        variance_y_m2=0.01,
+        variance_y_m2=VARIANCE_M2,
         height_m=4.0,
         diameter_m=seen.diameter_m,
         points=20,
     )
+
+
+@pytest.fixture(scope="module")
+def from_points(perceived: MemoryLog) -> list[LandmarkSolved]:
+    return placed(perceived)
 
 
 def placed(log: MemoryLog) -> list[LandmarkSolved]:
@@ -90,10 +96,19 @@ def placed(log: MemoryLog) -> list[LandmarkSolved]:
     return sorted(logged_maps(log)[-1].landmarks, key=lambda one: one.observations)
 
 
-def test_a_map_from_points_is_the_map_from_the_same_detections(detected: MemoryLog, perceived: MemoryLog) -> None:
-    ours, theirs = placed(perceived), placed(detected)
+def test_a_map_from_points_is_the_map_from_the_same_detections(
+    detected: MemoryLog, from_points: list[LandmarkSolved]
+) -> None:
+    ours, theirs = from_points, placed(detected)
     assert [one.observations for one in ours] == [one.observations for one in theirs]
-    assert np.abs(np.array([one.position_m for one in ours]) - [one.position_m for one in theirs]).max() < SAME_M
+    assert np.abs(np.array([one.position_m for one in ours]) - [one.position_m for one in theirs]).max() < SIGHT_M
+
+
+def test_a_landmark_is_no_surer_than_what_its_sights_share(from_points: list[LandmarkSolved]) -> None:
+    shared_m2 = SETTINGS.detections.shared_share * VARIANCE_M2
+    for one in from_points:
+        passes = len(one.vehicles) * 2  # each goes round once and a bit
+        assert np.linalg.eigvalsh(one.covariance_m2)[0] > 0.9 * shared_m2 / passes
 
 
 def test_a_map_says_how_far_it_took_perception_in(detected: MemoryLog, perceived: MemoryLog) -> None:
@@ -101,8 +116,8 @@ def test_a_map_says_how_far_it_took_perception_in(detected: MemoryLog, perceived
     assert PERCEIVED_STREAM not in dict(input_positions(detected))
 
 
-def test_behind_a_landmark_stands_what_perception_said(perceived: MemoryLog) -> None:
-    store, landmark = MemoryStore(), placed(perceived)[0]
+def test_behind_a_landmark_stands_what_perception_said(perceived: MemoryLog, from_points: list[LandmarkSolved]) -> None:
+    store, landmark = MemoryStore(), from_points[0]
     project(perceived, store)
     found = explained(perceived, store, landmark.landmark)
     seen = {(one.vehicle, one.boot_id, one.sequence) for one in found.sightings}

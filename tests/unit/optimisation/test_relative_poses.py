@@ -15,7 +15,7 @@ from trigpoint_optimisation.core.relative_poses import (
     add_relative_poses,
     between_keyframes,
     hung_motions,
-    widened,
+    scaled,
 )
 from trigpoint_optimisation.core.state import pose_key
 from trigpoint_optimisation.settings import Kernel, OdometrySettings, SolveSettings
@@ -117,6 +117,6 @@ def test_a_wrong_match_pulls_less_under_a_kernel(prepared: PreparedDrive) -> Non
     assert graph.error(at_truth(prepared)) < 2.0 * 3.0**2  # 31 250 without: the kernel's bound
 
 
-def test_inflation_multiplies_covariances(prepared: PreparedDrive) -> None:
+def test_a_factor_multiplies_covariances(prepared: PreparedDrive) -> None:
     hung = hung_motions(prepared, prepared, sweeps(prepared), point_scale=SCALE)
-    assert widened(hung, 4.0).covariance == pytest.approx(4.0 * hung.covariance)
+    assert scaled(hung, 4.0).covariance == pytest.approx(4.0 * hung.covariance)
