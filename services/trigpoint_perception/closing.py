@@ -152,13 +152,19 @@ def _told_of(log: EventLog, settings: ClosureSettings) -> dict[DriveName, _Told]
 
 def _due(told: dict[DriveName, _Told]) -> list[Search]:
     """Each drive with those before it, and itself, among which its places were not sought yet."""
-    searches, before = [], list[tuple[DriveName, tuple[Run, ...]]]()
-    for name, each in told.items():
-        runs = tuple(runs_of(each.motions, each.stamp_ns, each.seen))
-        before.append((name, runs))
-        among = tuple(other for other in before if other[0] not in each.sought)
+    runs: dict[DriveName, tuple[Run, ...]] = {}
+
+    def runs_by(name: DriveName) -> tuple[Run, ...]:
+        if name not in runs:
+            runs[name] = tuple(runs_of(told[name].motions, told[name].stamp_ns, told[name].seen))
+        return runs[name]
+
+    searches, names = [], list(told)
+    for number, name in enumerate(names):
+        among = [other for other in names[: number + 1] if other not in told[name].sought]
         if among:
-            searches.append(Search(name=name, runs=runs, among=among))
+            others = tuple((other, runs_by(other)) for other in among)
+            searches.append(Search(name=name, runs=runs_by(name), among=others))
     return searches
 
 

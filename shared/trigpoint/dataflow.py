@@ -98,7 +98,7 @@ FLOWS: tuple[Flow, ...] = (
     Flow(PoseFiltered, FILTERING, (EVALUATION,)),
     Flow(GateAlarmed, FILTERING, (EVALUATION,)),
     Flow(LandmarksPerceived, PERCEPTION, (OPTIMISATION, EVALUATION)),
-    Flow(OdometryMatched, PERCEPTION, ()),
+    Flow(OdometryMatched, PERCEPTION, (OPTIMISATION,)),
     Flow(LoopClosed, PERCEPTION, (OPTIMISATION,)),
     Flow(LoopsSought, PERCEPTION, ()),
     Flow(TrajectorySolved, OPTIMISATION, (LANDMARKS, EVALUATION, TILES)),

@@ -31,11 +31,6 @@ def with_loops(driven: World, *, wrong_share: float = 0.0, seed: int = 7) -> Dri
     again, before = met(driven.poses[0])
     motion = relative_poses(driven.poses[0][before], driven.poses[0][again]) / (FRAME.point_scale, FRAME.point_scale, 1)
     motion = motion + rng.normal(0.0, SIGMA, motion.shape)
-    wrong = rng.choice(len(motion), round(wrong_share * len(motion)), replace=False)
-    way, off_m = rng.uniform(0.0, 2.0 * np.pi, len(wrong)), rng.uniform(*WRONG_M, len(wrong))
-    motion[wrong, :2] += off_m[:, None] * np.column_stack([np.cos(way), np.sin(way)])
-    motion[wrong, 2] += rng.uniform(-WRONG_RAD, WRONG_RAD, len(wrong))
-    motion[:, 2] = wrap_angles_rad(motion[:, 2])
     drive = driven.drives[0]
     motions = MotionSeries(
         from_stamp_ns=_stamps(before),
@@ -43,7 +38,19 @@ def with_loops(driven: World, *, wrong_share: float = 0.0, seed: int = 7) -> Dri
         motion=motion,
         covariance=np.repeat(np.diag(SIGMA**2)[None], len(motion), axis=0),
     )
-    return replace(drive, loops=LoopSeries(other=((drive.vehicle, drive.boot_id),) * len(motion), motions=motions))
+    loops = LoopSeries(other=((drive.vehicle, drive.boot_id),) * len(motion), motions=motions)
+    return replace(drive, loops=spoiled(loops, wrong_share, rng))
+
+
+def spoiled(loops: LoopSeries, share: float, rng: np.random.Generator) -> LoopSeries:
+    """The loops, a share of them wrong: shifted by metres to tens of metres and turned by up to a radian."""
+    motion = loops.motions.motion.copy()
+    wrong = rng.choice(len(motion), round(share * len(motion)), replace=False)
+    way, off_m = rng.uniform(0.0, 2.0 * np.pi, len(wrong)), rng.uniform(*WRONG_M, len(wrong))
+    motion[wrong, :2] += off_m[:, None] * np.column_stack([np.cos(way), np.sin(way)])
+    motion[wrong, 2] += rng.uniform(-WRONG_RAD, WRONG_RAD, len(wrong))
+    motion[:, 2] = wrap_angles_rad(motion[:, 2])
+    return replace(loops, motions=replace(loops.motions, motion=motion))
 
 
 def met(pose: Floats) -> tuple[Ints, Ints]:

@@ -23,12 +23,12 @@ def sweep(number: int) -> PointsScanned:
     return swept(STREET, SIXTEEN, pose=driven_pose(VELOCITY, 0.1 * number), velocity=VELOCITY)
 
 
-def logged(folder: Path, events: list[Event]) -> Path:
+def logged(folder: Path, events: list[Event], *, boot_id: str = "boot-1") -> Path:
     with closing(McapLog(folder / "log")) as log:
         log.append(
             "veh-van",
             [
-                Envelope(EventIdentity("van", "boot-1", number), START_NS + number * PERIOD_NS, event)
+                Envelope(EventIdentity("van", boot_id, number), START_NS + number * PERIOD_NS, event)
                 for number, event in enumerate(events)
             ],
         )
@@ -42,8 +42,18 @@ def test_its_json_says_what_was_found_and_again_nothing_is_appended(
     statuses = [run(["perceive", "--data", str(data), "--json"]) for _ in range(2)]
     first, second = map(json.loads, capsys.readouterr().out.splitlines())
     assert statuses == [0, 0]
-    assert (first["drives"][0]["sweeps"], first["drives"][0]["poles"], first["appended"]) == (5, 5, 9)
-    assert second["appended"] == 0
+    assert (first["drives"][0]["sweeps"], first["drives"][0]["poles"], first["drives"][0]["appended"]) == (5, 5, 9)
+    assert (first["appended"], second["appended"]) == (10, 0)  # the search for loops too
+
+
+def test_it_says_which_loops_were_proposed_and_closed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    data = logged(tmp_path, [sweep(number) for number in range(5)])
+    logged(data, [sweep(number) for number in range(5)], boot_id="boot-2")
+    assert run(["perceive", "--data", str(data)]) == 0
+    assert "van: 1 loop proposed, 1 closed" in capsys.readouterr().out
+    run(["perceive", "--data", str(data), "--json"])
+    loops = json.loads(capsys.readouterr().out)["loops"]
+    assert sorted((each["proposed"], each["verified"], each["refused"]) for each in loops) == [(0, 0, {}), (1, 1, {})]
 
 
 def test_a_sweep_that_cannot_be_used_ends_it_with_status_2_after_the_others(
