@@ -24,9 +24,10 @@ def with_perceived(drives: Iterable[Drive], log: EventLog) -> tuple[Drive, ...]:
     """The drives with what perception found in their sweeps: its landmarks among the detections, each named by its
     sweep's sequence, and the motions it matched.
 
-    Where a drive was perceived more than once, by other settings, the last time counts. What the vehicle itself
-    detected stands back where perception found something: both saw the same things. Its detections with a signature
-    stay, other vehicles' too; and a camera's, beside which nothing that was perceived counts.
+    Where a drive was perceived more than once, by other settings, the last time counts. Where perception found something
+    in a drive, what the vehicle itself detected from the first to the last perceived sweep stands back: both saw the same
+    things. Its detections with a signature stay, other vehicles' too; and a camera's, beside which nothing that was
+    perceived counts.
     """
     drives = tuple(drives)
     told = _last_told(log, {(drive.vehicle, drive.boot_id) for drive in drives})
@@ -53,7 +54,9 @@ def _completed(drive: Drive, told: Sequence[Envelope[Perceived]]) -> Drive:
     matched = [(row.stamp_ns, row.event) for row in told if isinstance(row.event, OdometryMatched)]
     detections = drive.detections
     if any(event.landmarks for _, event in swept) and drive.described.landmark_sensor_model != CAMERA:
-        detections = _joined(_signed(drive.detections), _perceived_series(swept, drive.described))
+        stamps_ns = [stamp_ns for stamp_ns, _ in swept]
+        own = _standing(drive.detections, from_ns=min(stamps_ns), until_ns=max(stamps_ns))
+        detections = _joined(own, _perceived_series(swept, drive.described))
     return replace(drive, detections=detections, matched=_motion_series(matched))
 
 
@@ -78,9 +81,10 @@ def _perceived_series(swept: Iterable[tuple[int, LandmarksPerceived]], described
     )
 
 
-def _signed(series: DetectionSeries) -> DetectionSeries:
-    """The detections that say what they are of."""
-    rows = [row for row, signature in enumerate(series.signature) if signature]
+def _standing(series: DetectionSeries, *, from_ns: int, until_ns: int) -> DetectionSeries:
+    """The detections that say what they are of, and those outside the time."""
+    outside = (series.stamp_ns < from_ns) | (series.stamp_ns > until_ns)
+    rows = [row for row, signature in enumerate(series.signature) if signature or outside[row]]
     return DetectionSeries(
         stamp_ns=series.stamp_ns[rows],
         range_m=series.range_m[rows],

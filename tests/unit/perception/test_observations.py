@@ -98,10 +98,17 @@ def test_a_perceived_landmark_keeps_its_covariance_in_the_base_frame(log: Memory
 
 
 def test_what_the_vehicle_detected_stands_back_where_something_was_perceived(log: MemoryLog) -> None:
-    log.append("veh-van", [detected(1, "")])
+    log.append("veh-van", [detected(1, "", stamp_ns=1_008)])
+    log.append(PERCEIVED_STREAM, [perceived("one", 7), perceived("one", 9)])
+    (drive,) = logged_drives(log)
+    assert drive.detections.sequence.tolist() == [7, 9]
+
+
+def test_what_the_vehicle_detected_counts_as_long_as_its_sweeps_are_not_perceived(log: MemoryLog) -> None:
+    log.append("veh-van", [detected(1, "", stamp_ns=1_006), detected(2, "", stamp_ns=1_008)])
     log.append(PERCEIVED_STREAM, [perceived("one", 7)])
     (drive,) = logged_drives(log)
-    assert drive.detections.sequence.tolist() == [7]
+    assert drive.detections.sequence.tolist() == [1, 7, 2]
 
 
 def test_a_drive_in_which_nothing_was_perceived_keeps_what_it_detected(log: MemoryLog) -> None:
