@@ -24,10 +24,10 @@ def with_perceived(drives: Iterable[Drive], log: EventLog) -> tuple[Drive, ...]:
     """The drives with what perception found in their sweeps: its landmarks among the detections, each named by its
     sweep's sequence, and the motions it matched.
 
-    Where a drive was perceived more than once, by other settings, the last time counts. Where perception found something
-    in a drive, what the vehicle itself detected from the first to the last perceived sweep stands back: both saw the same
-    things. Its detections with a signature stay, other vehicles' too; and a camera's, beside which nothing that was
-    perceived counts.
+    Where a drive was perceived more than once, by other settings, the last time counts. Where perception found
+    something in a drive, what the vehicle itself detected from the first to the last perceived sweep stands back:
+    both saw the same things. Its detections with a signature stay, other vehicles' too; and a camera's, beside
+    which nothing that was perceived counts.
     """
     drives = tuple(drives)
     told = _last_told(log, {(drive.vehicle, drive.boot_id) for drive in drives})
