@@ -84,39 +84,30 @@ def _perceived_series(swept: Iterable[tuple[int, LandmarksPerceived]], described
 def _standing(series: DetectionSeries, *, from_ns: int, until_ns: int) -> DetectionSeries:
     """The detections that say what they are of, and those outside the time."""
     outside = (series.stamp_ns < from_ns) | (series.stamp_ns > until_ns)
-    rows = [row for row, signature in enumerate(series.signature) if signature or outside[row]]
-    return DetectionSeries(
-        stamp_ns=series.stamp_ns[rows],
-        range_m=series.range_m[rows],
-        bearing_rad=series.bearing_rad[rows],
-        diameter_m=series.diameter_m[rows],
-        kind=tuple(series.kind[row] for row in rows),
-        signature=tuple(series.signature[row] for row in rows),
-        sequence=series.sequence[rows],
-    )
+    signed = np.array([bool(signature) for signature in series.signature], dtype=bool)
+    return series.chosen(np.nonzero(outside | signed)[0])
 
 
 def _joined(own: DetectionSeries, perceived: DetectionSeries) -> DetectionSeries:
     """Both in order of time; NaN covariances of those that have none."""
-    order = np.argsort(np.concatenate([own.stamp_ns, perceived.stamp_ns]), kind="stable")
-    kind, signature = own.kind + perceived.kind, own.signature + perceived.signature
-    none = np.full((len(own.stamp_ns), 2, 2), np.nan)
     assert perceived.covariance_m2 is not None, "perception tells a covariance of each"
-    return DetectionSeries(
-        stamp_ns=np.concatenate([own.stamp_ns, perceived.stamp_ns])[order],
-        range_m=np.concatenate([own.range_m, perceived.range_m])[order],
-        bearing_rad=np.concatenate([own.bearing_rad, perceived.bearing_rad])[order],
-        diameter_m=np.concatenate([own.diameter_m, perceived.diameter_m])[order],
-        kind=tuple(kind[row] for row in order),
-        signature=tuple(signature[row] for row in order),
-        sequence=np.concatenate([own.sequence, perceived.sequence])[order],
-        covariance_m2=np.concatenate([none, perceived.covariance_m2])[order],
+    none = np.full((len(own.stamp_ns), 2, 2), np.nan)
+    both = DetectionSeries(
+        stamp_ns=np.concatenate([own.stamp_ns, perceived.stamp_ns]),
+        range_m=np.concatenate([own.range_m, perceived.range_m]),
+        bearing_rad=np.concatenate([own.bearing_rad, perceived.bearing_rad]),
+        diameter_m=np.concatenate([own.diameter_m, perceived.diameter_m]),
+        kind=own.kind + perceived.kind,
+        signature=own.signature + perceived.signature,
+        sequence=np.concatenate([own.sequence, perceived.sequence]),
+        covariance_m2=np.concatenate([none, perceived.covariance_m2]),
     )
+    return both.chosen(np.argsort(both.stamp_ns, kind="stable"))
 
 
 def _motion_series(matched: Iterable[tuple[int, OdometryMatched]]) -> MotionSeries:
-    """Motions from sweep to sweep in order of time."""
-    rows = sorted(matched, key=lambda row: row[0])
+    """Motions from sweep to sweep, sensor by sensor in order of time."""
+    rows = sorted(matched, key=lambda row: (row[1].sensor, row[0]))
     if not rows:
         return NO_MOTIONS
     return MotionSeries(

@@ -1,6 +1,7 @@
 """What was perceived becomes detections of its drive."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -73,11 +74,11 @@ def detected(sequence: int, *signatures: str, stamp_ns: int = 1_000) -> Envelope
     return Envelope(EventIdentity("van", "boot-1", sequence), stamp_ns, LandmarksDetected(detections=seen))
 
 
-def matched(told_as: str, sequence: int) -> Envelope[Event]:
+def matched(told_as: str, sequence: int, *, sensor: str = "roof") -> Envelope[Event]:
     event = OdometryMatched(
         vehicle="van",
         boot_id="boot-1",
-        sensor="roof",
+        sensor=sensor,
         from_sequence=sequence - 1,
         from_stamp_ns=1_000 + sequence - 1,
         sweep_sequence=sequence,
@@ -142,3 +143,11 @@ def test_motions_by_matched_points_belong_to_their_drive(log: MemoryLog) -> None
     assert (drive.matched.from_stamp_ns.tolist(), drive.matched.stamp_ns.tolist()) == ([1_007, 1_008], [1_008, 1_009])
     assert drive.matched.motion.tolist() == [[0.5, 0.8, 0.01], [0.5, 0.9, 0.01]]
     assert drive.matched.covariance[0].tolist() == np.diag([0.01, 0.02, 0.0001]).tolist()
+
+
+def test_motions_of_two_sensors_do_not_break_one_anothers_chain(log: MemoryLog) -> None:
+    rows = [matched("one", 6), matched("one", 6, sensor="front"), matched("one", 7), matched("one", 7, sensor="front")]
+    numbered = [replace(row, identity=replace(row.identity, sequence=n)) for n, row in enumerate(rows)]
+    log.append(PERCEIVED_STREAM, numbered)
+    (drive,) = logged_drives(log)
+    assert drive.matched.from_stamp_ns.tolist() == [1_005, 1_006, 1_005, 1_006]
