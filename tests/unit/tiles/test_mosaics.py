@@ -67,3 +67,9 @@ def test_tiles_of_two_sizes_are_refused_with_both() -> None:
     }
     with pytest.raises(InputError, match=r"/512.png: 512 pixels a side: /256.png has 256"):
         mosaic_vrt(two)
+
+
+def test_a_picture_without_a_crs_is_refused_by_name(tmp_path: Path) -> None:
+    write(tmp_path, WebTile(ZOOM, COLUMN, ROW), "RGB", (10, 20, 30))
+    with pytest.raises(InputError, match=f"{ROW}.png: the image has no CRS"):
+        RasterFile(tmp_path / str(ZOOM) / str(COLUMN) / f"{ROW}.png")
