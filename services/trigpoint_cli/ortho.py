@@ -211,6 +211,8 @@ def anchors(
     They take the place of those measured in the same image before; the next map version is solved with them.
     """
     known_as = asked["image"].stem if name is None else name
+    if not known_as:
+        raise InputError(f"--image {asked['image']}: it has no name of its own; give it one with --name")
     found = register_image(**asked)
     with data.opened_log() as log:
         measured = anchors_by_image(log, found)

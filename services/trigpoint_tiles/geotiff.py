@@ -1,6 +1,7 @@
 """Rasters as GeoTIFF: written cloud optimised from tiles, read on any grid. rasterio's one home."""
 
 import math
+import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,7 +11,7 @@ import rasterio
 import rasterio.shutil
 from numpy.typing import NDArray
 from rasterio.enums import ColorInterp, Resampling
-from rasterio.errors import RasterioError
+from rasterio.errors import NotGeoreferencedWarning, RasterioError
 from rasterio.transform import Affine, from_origin
 from rasterio.warp import calculate_default_transform, reproject, transform_bounds
 from rasterio.windows import Window
@@ -137,7 +138,9 @@ class RasterFile:
         """
         self.path = path
         try:
-            self._raster = rasterio.open(_tiles_as_one(path) if path.is_dir() else path)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", NotGeoreferencedWarning)  # refused below, by name
+                self._raster = rasterio.open(_tiles_as_one(path) if path.is_dir() else path)
         except RasterioError as error:
             raise InputError(f"{path}: no raster can be read here: {error}") from error
         if self._raster.crs is None or self._raster.transform.is_identity:

@@ -1,12 +1,12 @@
 """A vehicle on an arc over painted ground: every point is where the ground truly has it, at its own time."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trigpoint.events.envelope import Envelope, EventIdentity
-from trigpoint.events.mapped import Mapped, MapSolved, TrajectorySolved
+from trigpoint.events.mapped import LandmarkSolved, Mapped, MapSolved, TrajectorySolved
 from trigpoint.events.observed import MapFramePinned
 from trigpoint.events.scanned import PointsScanned
 from trigpoint.geodesy.positions import GridPosition
@@ -105,18 +105,24 @@ def drive_rows(
     ]
 
 
-def map_rows(paths: Iterable[TrajectorySolved], *, map_version: int = 1, first: int = 0) -> list[Envelope[Mapped]]:
-    """A whole map version of these paths."""
+def map_rows(
+    paths: Iterable[TrajectorySolved],
+    *,
+    landmarks: Sequence[LandmarkSolved] = (),
+    map_version: int = 1,
+    first: int = 0,
+) -> list[Envelope[Mapped]]:
+    """A whole map version of these paths and landmarks."""
     head = MapSolved(
         map_version=map_version,
         method="anchored",
         settings_json="{}",
         inputs=(),
-        landmark_count=0,
+        landmark_count=len(landmarks),
         anchor_count=0,
         wall_s=0.0,
     )
-    events: list[Mapped] = [*paths, head]
+    events: list[Mapped] = [*paths, *landmarks, head]
     return [
         Envelope(EventIdentity("optimisation", f"o{map_version}", first + number), START_NS, event)
         for number, event in enumerate(events)

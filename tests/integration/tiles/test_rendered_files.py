@@ -19,9 +19,17 @@ from scanned_drives.examples import (
     STRIPE_M,
     arc,
     drive_rows,
-    map_rows,
     scanned_log,
     solved_path,
+)
+from scanned_drives.moved_street import (
+    OTHER_STREET,
+    STREET,
+    bent_street,
+    rendered_anew,
+    smooth_ground,
+    two_versions,
+    whole_street,
 )
 from trigpoint.errors import InputError
 from trigpoint.geodesy.projection import transform_coordinates
@@ -33,7 +41,6 @@ from trigpoint_tiles.settings import TilesSettings
 
 SETTINGS = TilesSettings(resolution_m=0.2, memory_bytes=512 * 1024**2, attribution="Simulated", zooms=3)
 POSES = arc(5.0)
-MOVED_M = 0.5
 
 
 def one_drive() -> MemoryLog:
@@ -152,14 +159,7 @@ def pictures_of(folder: Path) -> dict[str, bytes]:
 
 def two_drives() -> tuple[MemoryLog, MemoryLog]:
     """Two drives far apart, and the same with a second map version that has moved the second one's path."""
-    far = arc(3.0, start=(400.0, 200.0, 0.3))
-    moved = far + np.array([MOVED_M, 0.0, 0.0])
-    rows = {"car": drive_rows("car", POSES), "van": drive_rows("van", far, seed=2, gain=1.5)}
-    first = scanned_log(rows, [solved_path("car", POSES), solved_path("van", far)])
-    second = scanned_log(rows, [solved_path("car", POSES), solved_path("van", far)])
-    paths = [solved_path("car", POSES, map_version=2), solved_path("van", moved, map_version=2)]
-    second.append("optimisation", map_rows(paths, map_version=2))
-    return first, second
+    return two_versions(OTHER_STREET, whole_street())
 
 
 def test_a_map_version_renders_only_what_moved_and_the_same_as_a_full_render(tmp_path: Path) -> None:
@@ -168,10 +168,16 @@ def test_a_map_version_renders_only_what_moved_and_the_same_as_a_full_render(tmp
     found = render_ortho(second, tmp_path / "kept", settings=SETTINGS)
     whole = render_ortho(second, tmp_path / "whole", settings=SETTINGS)
     for now, full in zip(found.grids, whole.grids, strict=True):
-        assert now.brought_up.counts["car/b"].kept_from_before == len(POSES) - 1
+        assert now.brought_up.counts["car/b"].used == 0
         assert 0 < len(now.brought_up.rendered) < len(full.brought_up.rendered)
     assert np.array_equal(bands_of(tmp_path / "kept/ortho.tif"), bands_of(tmp_path / "whole/ortho.tif"), equal_nan=True)
     assert pictures_of(tmp_path / "kept/xyz") == pictures_of(tmp_path / "whole/xyz")
+
+
+def test_where_a_streets_middle_moved_its_tiles_alone_are_rendered_and_all_equal_a_full_render(tmp_path: Path) -> None:
+    found = rendered_anew(tmp_path, STREET, bent_street(), world=smooth_ground)
+    assert 0 < found.touched < found.tiles
+    assert found.equal == found.tiles
 
 
 def test_the_same_version_again_renders_nothing(tmp_path: Path) -> None:

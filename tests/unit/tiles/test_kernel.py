@@ -83,6 +83,14 @@ def counts_of(tiles: dict[Tile, Cells]) -> dict[tuple[int, int], int]:
     return found
 
 
+def test_without_deskew_all_points_are_placed_by_the_pose_at_the_sweeps_stamp() -> None:
+    ((stamp_ns, sweep),) = sweeps(1)
+    skewed, _ = SweepPlacer(FRAME, UTM, reach_m=60.0, deskew=False).placed(sweep, stamp_ns, PATH)
+    at_once = replace(sweep, offset_ns=np.zeros_like(sweep.offset_ns))
+    still, _ = SweepPlacer(FRAME, UTM, reach_m=60.0).placed(at_once, stamp_ns, PATH)
+    assert (skewed.table.to_plane == still.table.to_plane[0]).all()
+
+
 @pytest.mark.parametrize("grid", [UTM, web_mercator_zoom(19)], ids=["utm", "web"])
 def test_points_fall_where_each_ones_own_pose_and_the_exact_projection_put_them(grid: RasterGrid) -> None:
     ((stamp_ns, sweep),) = sweeps(1)
