@@ -17,7 +17,7 @@ from trigpoint_tiles.app import PMTILES, render_ortho
 from trigpoint_tiles.hands import Hands
 
 DRIVES, SWEEPS = 6, 80
-RENDERED_DRIVES, RENDERED_SWEEPS = 6, 150
+RENDERED_DRIVES, RENDERED_SWEEPS = 6, 100
 COMMAND = f"trigpoint perceive --cluster tcp://…  # {DRIVES} drives of {SWEEPS} sweeps of 16 beams"
 RENDERING_COMMAND = f"trigpoint ortho render --cluster tcp://…  # {RENDERED_DRIVES} drives of {RENDERED_SWEEPS} sweeps"
 
