@@ -52,11 +52,12 @@ def command() -> None:
     "--deskew/--no-deskew", default=DEFAULTS.deskew, show_default=True, help="Place points by the pose at their time."
 )
 @click.option("--attribution", default=DEFAULTS.attribution, metavar="TEXT", help="Whom the data is from.")
+@click.option(
+    "--threads", type=click.IntRange(0), default=0, metavar="COUNT", help="Of this process, 1 GiB each; 0: one a core."
+)
 @cluster_option
 @answering
-def render(
-    data: DataDirectory, out: Path, *, crs: str | None, formats: str, cluster: str, screen: Screen, **asked: Any
-) -> Answer:
+def render(data: DataDirectory, out: Path, *, crs: str | None, formats: str, screen: Screen, **asked: Any) -> Answer:
     """Lay the points of all drives on the ground by the newest map version's paths.
 
     Into DIR come ortho.tif (COG), ortho.pmtiles, xyz/{z}/{x}/{y}.png and rasters.toml for the viewer's configuration.
@@ -65,11 +66,12 @@ def render(
     chosen = tuple(dict.fromkeys(formats.split(",")))
     if unknown := [name for name in chosen if name not in FORMATS]:
         raise InputError(f"--format {formats}: no {', '.join(unknown)}; there are {', '.join(FORMATS)}")
+    some = workers(asked.pop("cluster"), threads=asked.pop("threads"))
     settings = TilesSettings(**asked)
     with ExitStack() as stack:
         log = stack.enter_context(data.opened_log())
         hands = Hands(
-            stack.enter_context(workers(cluster)),
+            stack.enter_context(some),
             partial(_opened, data.log.absolute()),
             laying_out=stack.enter_context(screen.part_of("laying out sweeps")),
             rendering=stack.enter_context(screen.part_of("rendering tiles")),

@@ -201,12 +201,15 @@ def _write_tiles(hands: Hands, layer: GridLayer, found: BroughtUp, pictures: Pic
     anew = {web for web, tile in wanted.items() if tile in found.rendered or web not in there}
     ordered = sorted(anew, key=lambda one: (one.row, one.column))
     write = partial(write_pictures, layer.bands_folder, pictures)
-    for _ in hands.each("groups of tiles not drawn", write, together(ordered)):
-        pass
+    hands.do("groups of tiles not drawn", write, together(ordered))
     gone = there - wanted.keys()
     for web in gone:
         pictures.path(web).unlink()
-    pictures.write_ancestors(anew | gone, zoom_least=zoom_least)
+    above = anew | gone
+    for _ in range(zoom_least, zoom):
+        above = {WebTile(one.zoom - 1, one.column // 2, one.row // 2) for one in above}
+        ordered = sorted(above, key=lambda one: (one.row, one.column))
+        hands.do("groups of overviews not drawn", pictures.write_overviews, together(ordered))
 
 
 def write_pictures(bands: BandsFolder, pictures: PictureFolder, tiles: tuple[WebTile, ...]) -> None:

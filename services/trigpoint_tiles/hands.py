@@ -43,6 +43,11 @@ class Hands:
             refused = next((one for one in failures if isinstance(one, InputError)), None)
             raise refused or ServiceError(f"{len(failures)} of {count} {what}: {failures[0]}") from failures[0]
 
+    def do(self, what: str, work: Callable[[Item], None], items: Iterable[Item]) -> None:
+        """Every item done. Raises as `each` does."""
+        for _ in self.each(what, work, items):
+            pass
+
 
 def own_hands(log: RecallingLog) -> Hands:
     """The caller's thread, with the log it has open."""

@@ -51,13 +51,10 @@ class PictureFolder:
         except FileNotFoundError:
             return None
 
-    def write_ancestors(self, changed: Iterable[WebTile], *, zoom_least: int) -> None:
-        """All tiles above the changed ones, of one zoom, anew from those below them, up to a zoom."""
-        level = set(changed)
-        while level and next(iter(level)).zoom > zoom_least:
-            level = {WebTile(tile.zoom - 1, tile.column // 2, tile.row // 2) for tile in level}
-            for parent in sorted(level, key=lambda tile: (tile.column, tile.row)):
-                self.write(parent, from_farther(self._children(parent)))
+    def write_overviews(self, tiles: Iterable[WebTile]) -> None:
+        """Tiles anew from those one zoom below them."""
+        for tile in tiles:
+            self.write(tile, from_farther(self._children(tile)))
 
     def _children(self, parent: WebTile) -> dict[tuple[int, int], Picture]:
         found = {}

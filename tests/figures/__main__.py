@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from figures import (
+    billion,
     campus,
     demo,
     faults_ingest,
@@ -69,6 +70,7 @@ GROUPS: Mapping[str, Sequence[Figure]] = {
     "ortho": (*ortho.FIGURES, *ortho_aerial.FIGURES, *ortho_anew.FIGURES, *raster_readers.FIGURES),
     "relocalise": relocalise.FIGURES,
     "scale": scale.FIGURES,
+    "billion": billion.FIGURES,
     "security": (*security.FIGURES, *security_fuzz.FIGURES),
 }
 PROGRAM = (str(Path(sys.executable).with_name("trigpoint")),)

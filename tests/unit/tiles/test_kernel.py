@@ -156,6 +156,15 @@ def test_points_that_are_no_numbers_are_counted_and_cost_no_other_point() -> Non
     assert (found.unusable, found.used) == (400, 3600)
 
 
+def test_a_sensor_that_is_said_to_be_far_from_its_vehicle_hits_nothing_and_its_points_are_counted() -> None:
+    ((stamp_ns, sweep),) = sweeps(1)
+    astray = replace(sweep, sensor_position_m=np.array([500.0, 0.0, 1.9]))
+    accumulator = Accumulator(memory_bytes=MEMORY, hand_on=lambda tile, cells: None)
+    placed, box = SweepPlacer(FRAME, UTM, reach_m=60.0).placed(astray, stamp_ns, PATH)
+    found = accumulator.add(astray, placed, box, LIMITS)
+    assert (found.used, found.out_of_range, found.box) == (0, 4000, None)
+
+
 def test_an_empty_sweep_hits_nothing() -> None:
     ((stamp_ns, sweep),) = sweeps(1)
     none = replace(
