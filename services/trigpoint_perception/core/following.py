@@ -112,9 +112,7 @@ class SweepFollower:
         """One sweep searched, matched and tracked. Raises EventRejected where it is not usable."""
         sweep = self._still(usable_sweep(numbered.scanned, self._settings.sweep), numbered.stamp_ns)
         sights = sights_of(sweep, self._settings)
-        placed = self._placed(
-            numbered, sweep, self._odometry.matched(sweep.point_m, self._expected(numbered.stamp_ns))
-        )
+        placed = self._placed(numbered, sweep, self._odometry.matched(sweep.point_m, self._expected(numbered.stamp_ns)))
         match = placed.match
         odometry = self._odometry_event(numbered, match)
         self._last = placed
