@@ -9,7 +9,6 @@ from trigpoint_perception.core.walls import Walls
 from trigpoint_perception.settings import WallSettings
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 SAME_CORNER_M = 0.6  # two pairs of walls whose corners are nearer than this share one
 
@@ -36,7 +35,7 @@ def perceived_corners(walls: Walls, settings: WallSettings) -> tuple[PerceivedCo
     return tuple(kept)
 
 
-def _meeting(walls: Walls, settings: WallSettings) -> tuple[Ints, Ints]:
+def _meeting(walls: Walls, settings: WallSettings) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """The pairs of walls (m,) that make a corner."""
     across = _crossed(walls.direction[:, None], walls.direction[None])
     between_m = walls.middle_m[None] - walls.middle_m[:, None]
@@ -44,11 +43,14 @@ def _meeting(walls: Walls, settings: WallSettings) -> tuple[Ints, Ints]:
         along_first_m = _crossed(between_m, walls.direction[None]) / across
         along_second_m = _crossed(between_m, walls.direction[:, None]) / across
     meeting = np.triu(np.abs(across) >= np.sin(settings.angle_min_rad), 1)
-    for along_m, one in ((along_first_m, np.s_[:, None]), (along_second_m, np.s_[None])):
-        nearest_m = np.minimum(np.abs(along_m - walls.begin_m[one]), np.abs(along_m - walls.end_m[one]))
-        meeting &= nearest_m <= settings.reach_m
+    meeting &= _at_ends(along_first_m, walls.begin_m[:, None], walls.end_m[:, None], settings.reach_m)
+    meeting &= _at_ends(along_second_m, walls.begin_m[None], walls.end_m[None], settings.reach_m)
     one, other = np.nonzero(meeting)
     return one, other
+
+
+def _at_ends(along_m: Floats, begin_m: Floats, end_m: Floats, reach_m: float) -> NDArray[np.bool_]:
+    return np.minimum(np.abs(along_m - begin_m), np.abs(along_m - end_m)) <= reach_m
 
 
 def _crossed(first: Floats, second: Floats) -> Floats:
