@@ -14,9 +14,9 @@ from trigpoint_vehicle.cloud_conversion import CloudDrive, LeftAside
 from trigpoint_vehicle.core.kitti import (
     DESCRIBED,
     bin_points,
+    even_stamps_ns,
     kitti_sweep,
     lidar_mounting,
-    nominal_stamps_ns,
     oxts_events,
     oxts_rows,
     turn_ns,
@@ -79,7 +79,7 @@ def _published(source: Path) -> _Layout:
 
 def _collected(source: Path) -> _Layout:
     oxts = read_source(source, "oxts/oxts.txt")
-    stamps_ns = nominal_stamps_ns(len(oxts.text.splitlines()))
+    stamps_ns = even_stamps_ns(oxts_rows(oxts))
     named = ((path.stem.removeprefix("scan_"), path) for path in sorted(source.glob("scan_*.npz")))
     scans = {int(number): path for number, path in named if number.isdigit()}
     return _Layout(scans=scans, oxts=oxts, scan_stamps_ns=stamps_ns, oxts_stamps_ns=stamps_ns)

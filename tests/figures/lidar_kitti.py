@@ -210,8 +210,11 @@ FIGURES = (
         for attribute, name, unit in (("entropy", "mean map entropy", "nat"), ("thickness_m", "plane thickness", "m"))
         for points in (RAW, STILL)
     ),
-    measured("entropy lost by deskewing, by lidar odometry", "nat", gained("entropy", BY_LIDAR), at_least(0.0)),
-    measured("thickness lost by deskewing, by lidar odometry", "m", gained("thickness_m", BY_LIDAR), at_least(0.0)),
+    *(
+        measured(f"{name} lost by deskewing, by {registered_by}", unit, gained(attribute, registered_by), at_least(0.0))
+        for registered_by in (BY_OXTS, BY_LIDAR)
+        for attribute, name, unit in (("entropy", "entropy", "nat"), ("thickness_m", "thickness", "m"))
+    ),
     measured("finding landmarks in 16 beams, x real time on one core", "", detection_factor, at_least(5.0)),
     measured("all of perception on 16 beams, x real time on one core", "", following_factor, at_least(5.0)),
 )

@@ -26,13 +26,8 @@ class PerceivedCorner:
 
 def perceived_corners(walls: Walls, settings: WallSettings) -> tuple[PerceivedCorner, ...]:
     """Corners of walls that meet at 60 to 120 degrees within reach of an end of both, the surest of each place."""
-    count = len(walls.top_m)
-    corners = [
-        corner
-        for one in range(count)
-        for other in range(one + 1, count)
-        if (corner := _corner(walls, one, other, settings)) is not None
-    ]
+    pairs = zip(*_meeting(walls, settings), strict=True)
+    corners = [_corner(walls, int(one), int(other), settings) for one, other in pairs]
     kept: list[PerceivedCorner] = []
     for corner in sorted(corners, key=lambda each: float(np.trace(each.covariance_m2))):
         if all(np.hypot(*(corner.position_m - other.position_m)) > SAME_CORNER_M for other in kept):
@@ -40,16 +35,36 @@ def perceived_corners(walls: Walls, settings: WallSettings) -> tuple[PerceivedCo
     return tuple(kept)
 
 
-def _corner(walls: Walls, one: int, other: int, settings: WallSettings) -> PerceivedCorner | None:
+def _meeting(walls: Walls, settings: WallSettings) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The pairs of walls (m,) that make a corner."""
+    across = _crossed(walls.direction[:, None], walls.direction[None])
+    between_m = walls.middle_m[None] - walls.middle_m[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along_first_m = _crossed(between_m, walls.direction[None]) / across
+        along_second_m = _crossed(between_m, walls.direction[:, None]) / across
+    meeting = np.triu(np.abs(across) >= np.sin(settings.angle_min_rad), 1)
+    meeting &= _at_ends(along_first_m, walls.begin_m[:, None], walls.end_m[:, None], settings.reach_m)
+    meeting &= _at_ends(along_second_m, walls.begin_m[None], walls.end_m[None], settings.reach_m)
+    one, other = np.nonzero(meeting)
+    return one, other
+
+
+def _at_ends(along_m: Floats, begin_m: Floats, end_m: Floats, reach_m: float) -> NDArray[np.bool_]:
+    return np.minimum(np.abs(along_m - begin_m), np.abs(along_m - end_m)) <= reach_m
+
+
+def _crossed(first: Floats, second: Floats) -> Floats:
+    """The cross products (...) of vectors (..., 2)."""
+    crossed: Floats = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
+    return crossed
+
+
+def _corner(walls: Walls, one: int, other: int, settings: WallSettings) -> PerceivedCorner:
     first, second = walls.direction[one], walls.direction[other]
-    sine = float(first[0] * second[1] - first[1] * second[0])
-    if abs(sine) < np.sin(settings.angle_min_rad):
-        return None
+    sine = float(_crossed(first, second))
     between_m = walls.middle_m[other] - walls.middle_m[one]
-    along_first_m = float(between_m[0] * second[1] - between_m[1] * second[0]) / sine
-    along_second_m = float(between_m[0] * first[1] - between_m[1] * first[0]) / sine
-    if not (_at_end(walls, one, along_first_m, settings) and _at_end(walls, other, along_second_m, settings)):
-        return None
+    along_first_m = float(_crossed(between_m, second)) / sine
+    along_second_m = float(_crossed(between_m, first)) / sine
     normals = np.array([[-first[1], first[0]], [-second[1], second[0]]])
     variance_m2 = np.array([_variance_m2(walls, one, along_first_m), _variance_m2(walls, other, along_second_m)])
     solved = np.linalg.inv(normals)
@@ -59,11 +74,6 @@ def _corner(walls: Walls, one: int, other: int, settings: WallSettings) -> Perce
         top_m=float(min(walls.top_m[one], walls.top_m[other])),
         points=int(walls.points[one] + walls.points[other]),
     )
-
-
-def _at_end(walls: Walls, wall: int, along_m: float, settings: WallSettings) -> bool:
-    nearest_m = min(abs(along_m - float(walls.begin_m[wall])), abs(along_m - float(walls.end_m[wall])))
-    return nearest_m <= settings.reach_m
 
 
 def _variance_m2(walls: Walls, wall: int, along_m: float) -> float:

@@ -53,9 +53,10 @@ def poses_at(path: Path, stamp_ns: Ints) -> tuple[Floats, Floats]:
     after = np.clip(np.searchsorted(t_s, at_s), 1, len(t_s) - 1)
     share = ((at_s - t_s[after - 1]) / (t_s[after] - t_s[after - 1]))[:, None]
     position_m = path.position_m[after - 1] + share * (path.position_m[after] - path.position_m[after - 1])
-    before, next_ = path.rotation[after - 1], path.rotation[after]
-    turn = (before.inv() * next_).as_rotvec()
-    return position_m, (before * Rotation.from_rotvec(share * turn)).as_matrix()
+    step, of_step = np.unique(after, return_inverse=True)
+    before, next_ = path.rotation[step - 1], path.rotation[step]
+    turn = (before.inv() * next_).as_rotvec()[of_step]
+    return position_m, before.as_matrix()[of_step] @ Rotation.from_rotvec(share * turn).as_matrix()
 
 
 def deskewed(point_m: Floats, offset_ns: Ints, *, stamp_ns: int, path: Path) -> Floats:

@@ -70,6 +70,7 @@ class SweepFollower:
         self._tracks = Tracks()
         self._last: _Placed | None = None
         self._velocity: Floats | None = None
+        self._begun: tuple[NumberedSweep, Sweep] | None = None  # the first sweep, until a velocity is known
         self._waiting: deque[_Waiting] = deque()
         self._number = 0  # of the sweep, refused ones too
         self.restarts = 0  # where the clock jumped or sweeps were missing
@@ -113,26 +114,41 @@ class SweepFollower:
         told = self.finished()
         self._odometry = LidarOdometry(self._settings.odometry)
         self._tracks = Tracks(next_number=self._tracks.next_number)
-        self._last = None
+        self._last, self._begun = None, None
         self.restarts += 1
         return told
 
     def _seen(self, numbered: NumberedSweep) -> _Waiting:
         """One sweep searched, matched and tracked. Raises EventRejected where it is not usable."""
-        sweep = self._still(usable_sweep(numbered.scanned, self._settings.sweep), numbered.stamp_ns)
+        usable = usable_sweep(numbered.scanned, self._settings.sweep)
+        sweep, placed = self._matched(numbered, usable)
+        if self._begun is not None and self._velocity is not None:
+            self._begin_again(self._begun)
+            sweep, placed = self._matched(numbered, usable)
+        if self._last is None and self._velocity is None and not self._is_covered(usable, numbered.stamp_ns):
+            self._begun = numbered, usable
         sights = sights_of(sweep, self._settings)
-        placed = self._placed(numbered, sweep, self._odometry.matched(sweep.point_m, self._expected(numbered.stamp_ns)))
-        match = placed.match
-        odometry = self._odometry_event(numbered, match)
+        odometry = self._odometry_event(numbered, placed.match)
         self._last = placed
         self._tracks, numbers = followed(
             self._tracks,
             sights,
-            planar_pose(match.T_odom_base),
+            planar_pose(placed.match.T_odom_base),
             sweep=self._number,
             settings=self._settings.track,
         )
         return _Waiting(numbered, "", sights, numbers, odometry)
+
+    def _matched(self, numbered: NumberedSweep, usable: Sweep) -> tuple[Sweep, _Placed]:
+        sweep = self._still(usable, numbered.stamp_ns)
+        match = self._odometry.matched(sweep.point_m, self._expected(numbered.stamp_ns))
+        return sweep, self._placed(numbered, sweep, match)
+
+    def _begin_again(self, begun: tuple[NumberedSweep, Sweep]) -> None:
+        """The map begun anew by its first sweep, now that a velocity is known to deskew it by."""
+        self._begun, self._last = None, None
+        self._odometry = LidarOdometry(self._settings.odometry)
+        _, self._last = self._matched(*begun)
 
     def _still(self, sweep: Sweep, stamp_ns: int) -> Sweep:
         """The sweep as if the base had stood at its stamp, as well as its motion is known beforehand."""

@@ -7,13 +7,16 @@ import small_gicp
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from trigpoint.compiled import compiled
 from trigpoint_perception.core.kept_map import NEIGHBOURS, KeptMap
 from trigpoint_perception.settings import OdometrySettings
 
 Floats = NDArray[np.float64]
 
-ROTATION_STEP_RAD = 5e-4
+ROTATION_STEP_RAD = 1e-3  # a step as short as these is the last: each is a small share of the one before it
+TRANSLATION_STEP_M = 5e-3
 ITERATIONS_MAX = 20  # then points only change voxels to and fro, and the place by less than a millimetre
+HASH = 73_856_093, 19_349_663, 83_492_791  # of a voxel's place (Teschner et al. 2003)
 PLANAR = np.ix_([3, 4, 2], [3, 4, 2])  # x, y, heading of a twist: rotation first, then translation
 
 
@@ -39,7 +42,8 @@ class LidarOdometry:
     def matched(self, point_m: Floats, expected: Floats) -> Match:
         """The place of a deskewed sweep, points (n, 3) in the base frame, expected at `expected` (4, 4)."""
         settings = self._settings
-        cloud, _ = small_gicp.preprocess_points(point_m, settings.downsampled_m, NEIGHBOURS, 1)
+        cloud = small_gicp.PointCloud(downsampled(point_m, settings.downsampled_m))
+        small_gicp.estimate_covariances(cloud, num_neighbors=NEIGHBOURS, num_threads=1)
         if not self._begun:
             self._begun = True
             self._map.insert(cloud, expected)
@@ -52,6 +56,7 @@ class LidarOdometry:
             num_threads=1,
             max_iterations=ITERATIONS_MAX,
             rotation_epsilon=ROTATION_STEP_RAD,
+            translation_epsilon=TRANSLATION_STEP_M,
         )
         share = found.num_inliers / max(cloud.size(), 1)
         covariance = planar_covariance(
@@ -61,6 +66,38 @@ class LidarOdometry:
         placed = expected if refusal else np.asarray(found.T_target_source)
         self._map.insert(cloud, placed)
         return Match(T_odom_base=placed, covariance=covariance, matched_share=share, refusal=refusal)
+
+
+@compiled
+def downsampled(point_m: Floats, voxel_m: float) -> Floats:
+    """The mean (m, 3) of the points (n, 3) of each cubic voxel, in the order of the voxels' first points."""
+    slots = 2
+    while slots < 2 * len(point_m):
+        slots *= 2
+    holder, voxel_at = np.full(slots, -1, np.int64), np.empty((len(point_m), 3), np.int64)
+    total, count = np.empty((len(point_m), 3)), np.zeros(len(point_m))
+    found = 0
+    for row in range(len(point_m)):
+        x = int(np.floor(point_m[row, 0] / voxel_m))
+        y = int(np.floor(point_m[row, 1] / voxel_m))
+        z = int(np.floor(point_m[row, 2] / voxel_m))
+        slot = ((x * HASH[0]) ^ (y * HASH[1]) ^ (z * HASH[2])) & (slots - 1)
+        while holder[slot] >= 0:
+            there = voxel_at[holder[slot]]
+            if there[0] == x and there[1] == y and there[2] == z:
+                break
+            slot = (slot + 1) & (slots - 1)
+        voxel = holder[slot]
+        if voxel < 0:
+            voxel = found
+            holder[slot] = voxel
+            voxel_at[voxel, 0], voxel_at[voxel, 1], voxel_at[voxel, 2] = x, y, z
+            total[voxel] = 0.0
+            found += 1
+        count[voxel] += 1.0
+        for axis in range(3):
+            total[voxel, axis] += point_m[row, axis]
+    return total[:found] / count[:found].reshape(-1, 1)
 
 
 def _refusal(share: float, covariance: Floats, settings: OdometrySettings) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from trigpoint.compiled import compiled
 from trigpoint.geodesy.poses import transform_points
 from trigpoint_perception.settings import TrackSettings
 
@@ -94,15 +95,29 @@ def _partners(
     if not live or not sights:
         return {}
     at_m = np.array([track.position_m for track in live])
-    offset_m = placed_m[:, None, :] - at_m[None]
     known_m2 = np.array([track.covariance_m2 for track in live])
-    joint = covariance_m2[:, None] + known_m2[None] + ODOMETRY_SIGMA_M**2 * np.eye(2)
-    chi_square = np.einsum("ijk,ijkl,ijl->ij", offset_m, np.linalg.inv(joint), offset_m)
-    other_kind = np.array([[sight.kind != track.kind for track in live] for sight in sights])
-    outside = (chi_square > settings.gate_chi_square) | (np.linalg.norm(offset_m, axis=2) > settings.gate_m)
-    cost = np.where(outside | other_kind, FAR, chi_square)
+    cost = _costs(placed_m, covariance_m2, at_m, known_m2, np.array([settings.gate_m, settings.gate_chi_square]))
+    cost[np.array([sight.kind for sight in sights])[:, None] != np.array([track.kind for track in live])] = FAR
     rows, columns = linear_sum_assignment(cost)
     return {int(row): int(column) for row, column in zip(rows, columns, strict=True) if cost[row, column] < FAR}
+
+
+@compiled
+def _costs(placed_m: Floats, covariance_m2: Floats, at_m: Floats, known_m2: Floats, gate: Floats) -> Floats:
+    """The squared Mahalanobis distances (n, m) of sights from tracks, FAR outside the gate (2,) in m and chi square."""
+    cost = np.full((len(placed_m), len(at_m)), FAR)
+    for row in range(len(placed_m)):
+        for column in range(len(at_m)):
+            x, y = placed_m[row, 0] - at_m[column, 0], placed_m[row, 1] - at_m[column, 1]
+            if x * x + y * y > gate[0] ** 2:
+                continue
+            xx = covariance_m2[row, 0, 0] + known_m2[column, 0, 0] + ODOMETRY_SIGMA_M**2
+            yy = covariance_m2[row, 1, 1] + known_m2[column, 1, 1] + ODOMETRY_SIGMA_M**2
+            xy = covariance_m2[row, 0, 1] + known_m2[column, 0, 1]
+            chi_square = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / (xx * yy - xy * xy)
+            if chi_square <= gate[1]:
+                cost[row, column] = chi_square
+    return cost
 
 
 def _begun(number: int, sight: Sight, placed_m: Floats, covariance_m2: Floats, sweep: int) -> Track:
@@ -120,21 +135,28 @@ def _begun(number: int, sight: Sight, placed_m: Floats, covariance_m2: Floats, s
 def _seen_again(
     track: Track, sight: Sight, placed_m: Floats, covariance_m2: Floats, sweep: int, settings: TrackSettings
 ) -> Track:
-    joint = track.covariance_m2 + covariance_m2
-    gain = track.covariance_m2 @ np.linalg.inv(joint)
+    position_m, known_m2 = _fused(track.position_m, track.covariance_m2, placed_m, covariance_m2)
     kept = [row for row, seen in enumerate(track.seen) if sweep - seen < settings.window]
     seen = (*(track.seen[row] for row in kept), sweep)
     places_m = (*(track.places_m[row] for row in kept), (float(placed_m[0]), float(placed_m[1])))
-    known_m2, least_m2 = (np.eye(2) - gain) @ track.covariance_m2, KEPT_COVARIANCE * covariance_m2
     return replace(
         track,
-        position_m=track.position_m + gain @ (placed_m - track.position_m),
-        covariance_m2=known_m2 if np.trace(known_m2) > np.trace(least_m2) else least_m2,
+        position_m=position_m,
+        covariance_m2=known_m2,
         seen=seen,
         places_m=places_m,
         classes=(*track.classes, sight.landmark_class)[-CLASSES_KEPT:],
         confirmed=track.confirmed or (len(seen) >= settings.seen_min and _stands(places_m, settings)),
     )
+
+
+@compiled
+def _fused(position_m: Floats, known_m2: Floats, placed_m: Floats, covariance_m2: Floats) -> tuple[Floats, Floats]:
+    """A track's place (2,) and covariance (2, 2) after one more sight (Kalman's update for what stands still)."""
+    gain = known_m2 @ np.linalg.inv(known_m2 + covariance_m2)
+    place_m = position_m + gain @ (placed_m - position_m)
+    fused_m2, least_m2 = known_m2 - gain @ known_m2, KEPT_COVARIANCE * covariance_m2
+    return place_m, fused_m2 if np.trace(fused_m2) > np.trace(least_m2) else least_m2
 
 
 def _stands(places_m: Sequence[tuple[float, float]], settings: TrackSettings) -> bool:

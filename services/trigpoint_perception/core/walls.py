@@ -86,7 +86,7 @@ def _kept(sums: Floats, extent: Floats, settings: WallSettings) -> Walls:
 
 def _fitted(sums: Floats) -> tuple[Floats, Floats, Floats]:
     """Middles (m, 2), directions (m, 2) and root mean square distances (m,) from the lines of sums (m, 9)."""
-    line = np.array([_line(row) for row in sums]).reshape(-1, 5)
+    line = _lines(sums)
     return line[:, 0:2], line[:, 2:4], line[:, 4]
 
 
@@ -103,7 +103,7 @@ def _cells(point_m: Floats, height_m: Floats, corner_m: Floats, cell_m: float, s
 
 @compiled
 def _filled(cell: Ints, height_m: Floats, cells: int, top_min_m: float, extent_min_m: float) -> Bools:
-    low, high = np.full(cells, np.inf), np.full(cells, -np.inf)
+    low, high = np.full(cells, np.float32(np.inf)), np.full(cells, np.float32(-np.inf))
     for row in range(len(cell)):
         if cell[row] >= 0:
             low[cell[row]] = min(low[cell[row]], height_m[row])
@@ -124,6 +124,15 @@ def _line(sums: Floats) -> Line:
     angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
     smallest = 0.5 * (xx + yy) - np.hypot(0.5 * (xx - yy), xy)
     return x, y, np.cos(angle), np.sin(angle), np.sqrt(max(smallest, 0.0))
+
+
+@compiled
+def _lines(sums: Floats) -> Floats:
+    """The lines (m, 5) of sums (m, 9)."""
+    lines = np.empty((len(sums), 5))
+    for row in range(len(sums)):
+        lines[row, 0], lines[row, 1], lines[row, 2], lines[row, 3], lines[row, 4] = _line(sums[row])
+    return lines
 
 
 @compiled

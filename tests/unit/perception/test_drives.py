@@ -67,6 +67,20 @@ def test_a_motion_is_what_was_driven_within_what_it_claims(sweeps: list[Numbered
     assert np.einsum("ij,ijk,ik->i", errors, np.linalg.inv(claimed), errors).max() < 16.3  # 3 degrees, 99.9 %
 
 
+def stamped_at_begin(sweep: NumberedSweep) -> NumberedSweep:
+    """The same points, told of with the time of the first instead of the middle one."""
+    half_ns = PERIOD_NS // 2
+    scanned = replace(sweep.scanned, offset_ns=sweep.scanned.offset_ns + np.int32(half_ns))
+    return replace(sweep, stamp_ns=sweep.stamp_ns - half_ns, scanned=scanned)
+
+
+def test_sweeps_stamped_at_their_begin_are_followed_without_wheels() -> None:
+    _, motions = told([stamped_at_begin(sweep) for sweep in drive(16)])
+    errors_m = np.array([[one.x_m, one.y_m] for one in motions]) - driven_pose(VELOCITY, 0.1)[:2]
+    assert np.abs(errors_m).max() < 0.1  # of 0.8 m, the first ones too
+    assert np.abs(errors_m[-5:]).max() < 0.02  # settled, not swinging to and fro
+
+
 def test_a_thing_keeps_its_number(sweeps: list[NumberedSweep]) -> None:
     landmarks, _ = told(sweeps)
     assert len({(one.kind, one.track) for event in landmarks for one in event.landmarks}) <= 7  # 5 poles, 2 corners

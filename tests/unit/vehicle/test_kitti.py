@@ -18,7 +18,10 @@ from trigpoint_vehicle.cloud_conversion import WrittenClouds
 from trigpoint_vehicle.core.kitti import (
     FIRST_STAMP_NS,
     FORWARD_SPEED,
+    YAW,
+    YAW_RATE,
     bin_points,
+    even_stamps_ns,
     kitti_sweep,
     laser_of_point,
     lidar_mounting,
@@ -30,6 +33,7 @@ from trigpoint_vehicle.core.mountings import AT_BASE
 from trigpoint_vehicle.core.text_tables import SourceText
 from trigpoint_vehicle.kitti_files import kitti_drive
 
+Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 
 OXTS = "49.01 8.42 112.8 0.02 0 -1.2 -3.3 1.1 3.5 0.03 -0.03 0 0 0 0.7 0.3 9.9 0 0 0 0 0 0.14 0.49 0.06 4 10 4 4 0"
@@ -86,6 +90,34 @@ def test_a_collected_drive_has_a_fix_inertial_data_and_speed_a_row_and_every_sca
 def test_the_row_of_the_oxts_is_the_number_of_the_scan_at_10_hz(tmp_path: Path) -> None:
     written = convert_kitti(collected(tmp_path / "in"), tmp_path / "out")
     assert [stamp_ns - FIRST_STAMP_NS for stamp_ns, _ in sweeps_of(written.log)] == [0, 200_000_000]
+
+
+def oxts_turning(step_s: float, *, yaw_sigma_rad: float = 0.0) -> Floats:
+    """Rows of a car that turns to and fro, so far apart in time."""
+    at_s = step_s * np.arange(150)
+    rows = np.zeros((150, 30))
+    rows[:, YAW] = 3.0 - np.cos(0.4 * at_s) + np.random.default_rng(1).normal(0.0, yaw_sigma_rad, 150)
+    rows[:, YAW] = (rows[:, YAW] + np.pi) % (2.0 * np.pi) - np.pi
+    rows[:, YAW_RATE] = 0.4 * np.sin(0.4 * at_s)
+    return rows
+
+
+def test_scans_without_times_are_as_far_apart_as_the_yaw_rate_adds_up_to_the_yaw() -> None:
+    steps_ns = np.diff(even_stamps_ns(oxts_turning(0.1036, yaw_sigma_rad=1e-4)))
+    assert steps_ns.min() == steps_ns.max() == pytest.approx(103_600_000, rel=2e-3)  # 0.1 mrad of 20 mrad a step
+
+
+@pytest.mark.parametrize(
+    "rows", [np.zeros((150, 30)), oxts_turning(0.1036, yaw_sigma_rad=0.05), oxts_turning(1.0), np.full((9, 30), np.nan)]
+)
+def test_they_are_nominally_apart_where_the_yaw_does_not_tell(rows: Floats) -> None:
+    assert set(np.diff(even_stamps_ns(rows))) == {100_000_000}
+
+
+@pytest.mark.data
+def test_the_recorded_scans_are_103_6_ms_apart(recorded: WrittenClouds) -> None:
+    stamps_ns = [stamp_ns for stamp_ns, _ in sweeps_of(recorded.log)]
+    assert np.diff(stamps_ns) == pytest.approx(np.full(76, 207_200_000), rel=5e-3)  # by the lidar's odometry 206 to 208
 
 
 def test_events_stand_in_order_of_time(tmp_path: Path) -> None:
@@ -244,8 +276,7 @@ def test_surfaces_over_the_seam_of_a_turn_are_apart_by_what_the_car_drove_in_it(
     source = recorded_drives / "kitti_0005"
     speed_mps = np.loadtxt(source / "oxts/oxts.txt")[:, FORWARD_SPEED]
     found: dict[int, list[tuple[int, float]]] = {ring: [] for ring in SEAM_RINGS}
-    for stamp_ns, sweep in sweeps_of(recorded.log):
-        speed = speed_mps[(stamp_ns - FIRST_STAMP_NS) // 100_000_000]
+    for (_, sweep), speed in zip(sweeps_of(recorded.log), speed_mps[::2], strict=True):  # every second scan is there
         for ring, degree, jump_m in _seams(sweep):
             found[ring].append((degree, jump_m / speed - _later_on_the_right_s(sweep)))
     medians_s = []
