@@ -35,7 +35,7 @@ from trigpoint_optimisation.whole_solve import SolverInPlace
 from trigpoint_perception.app import STREAM
 from trigpoint_perception.live import LivePerception
 
-SWEEPS = 40
+SWEEPS = 60  # on a bend: a shorter one does not tell a heading
 WAITING = 5  # sweeps of a drive that goes on
 NEVER_S = 1e9
 EAGER = SolveSettings(live=LiveSettings(version_interval_s=0.2, settle_s=NEVER_S, solve_interval_s=NEVER_S))
