@@ -167,14 +167,14 @@ class LiveOptimisation:
     def _take(self) -> bool:
         """Whether anything was new; corrections of odometry are appended."""
         assert self._fleet is not None, "begun before"
-        perceived, found = self._perceived.take(self._fleet)
+        perceived, found = self._perceived.take(self._fleet, measurements_wait=self._measured.lag > 0)
         places = {(place.vehicle, place.boot_id): place for place in found}
         rows = self._measured.take(BATCH)
         began_s = time.perf_counter()
         for row in rows:
             envelope = cast(Envelope[Observed], row.envelope)
             self._newest_ns = max(self._newest_ns, envelope.stamp_ns)
-            for place in self._fleet.take(envelope):
+            for place in self._taken(self._fleet, envelope):
                 places[place.vehicle, place.boot_id] = place
                 self._instruments.update_seconds.observe(time.perf_counter() - began_s)
                 began_s = time.perf_counter()
@@ -189,6 +189,12 @@ class LiveOptimisation:
         lag_events = self._measured.lag if rows else 0  # who found nothing new is not behind
         self._backlog.show(taken=sum(self._measured.checkpoint.values()), lag_events=lag_events)
         return bool(rows or verdicts or perceived)
+
+    def _taken(self, fleet: LiveFleet, row: Envelope[Observed]) -> Sequence[DrivePlace]:
+        """Where one more measurement brought its drive; of one that begins with it, what was perceived already."""
+        begins = fleet.described((row.identity.source, row.identity.boot_id)) is None
+        places = fleet.take(row)
+        return [*places, *self._perceived.begun(fleet)] if begins else places
 
     def _correct(self, places: Sequence[DrivePlace]) -> None:
         rows: list[Envelope[Event]] = []

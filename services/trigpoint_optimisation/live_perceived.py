@@ -1,7 +1,7 @@
 """What perception found in the sweeps of the drives under way, as it comes into the log."""
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterable
 from typing import cast
 
 from trigpoint.events.envelope import Envelope, EventIdentity
@@ -15,7 +15,7 @@ from trigpoint_optimisation.core.live_state import DriveName, DrivePlace
 
 BATCH = 64  # events taken at a time
 AHEAD_SWEEPS = 300  # of the measurements that are read with them
-UNKNOWN_SWEEPS = 300  # kept of drives that have not begun: those that never will are forgotten
+UNKNOWN_SWEEPS = 400  # kept of drives that have not begun: those that never will are forgotten
 
 Perceived = Envelope[LandmarksPerceived]
 
@@ -38,22 +38,26 @@ class PerceivedLandmarks:
         """The number after the last event taken."""
         return self._follower.checkpoint[PERCEIVED_STREAM]
 
-    def take(self, fleet: LiveFleet) -> tuple[bool, list[DrivePlace]]:
-        """Whether anything was new, and where that brought drives; no farther ahead of the drives than is needed."""
-        taken, places = False, self._given(fleet, self._begun(fleet))
-        while fleet.ahead < AHEAD_SWEEPS and (rows := self._follower.take(BATCH)):
+    def take(self, fleet: LiveFleet, *, measurements_wait: bool) -> tuple[bool, list[DrivePlace]]:
+        """Whether anything was new, and where that brought drives; no farther ahead of the drives than is needed, as
+        long as measurements wait in the log."""
+        taken, places = False, self.begun(fleet)
+        while self._may_go_on(fleet, measurements_wait=measurements_wait) and (rows := self._follower.take(BATCH)):
             taken = True
             places += self._given(fleet, (cast(Perceived, row.envelope) for row in rows))
         return taken, places
 
-    def _begun(self, fleet: LiveFleet) -> list[Perceived]:
-        """Those that waited for their drive to begin, once it has."""
+    def _may_go_on(self, fleet: LiveFleet, *, measurements_wait: bool) -> bool:
+        return fleet.ahead + (len(self._unknown) if measurements_wait else 0) < AHEAD_SWEEPS
+
+    def begun(self, fleet: LiveFleet) -> list[DrivePlace]:
+        """Those that waited for their drive to begin given to it, once it has."""
         begun = [row for row in self._unknown if fleet.described(_drive_of(row)) is not None]
         if begun:
             self._unknown = deque((row for row in self._unknown if row not in begun), maxlen=UNKNOWN_SWEEPS)
-        return begun
+        return self._given(fleet, begun)
 
-    def _given(self, fleet: LiveFleet, rows: "Iterator[Perceived] | list[Perceived]") -> list[DrivePlace]:
+    def _given(self, fleet: LiveFleet, rows: Iterable[Perceived]) -> list[DrivePlace]:
         places: list[DrivePlace] = []
         for row in rows:
             name, told_as = _drive_of(row), row.identity.boot_id

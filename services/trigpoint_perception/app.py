@@ -21,7 +21,7 @@ from trigpoint.workers import Tally, Workers
 from trigpoint_perception.core.drive_following import DriveFollower
 from trigpoint_perception.core.motion_window import MOTION_KINDS
 from trigpoint_perception.core.perceiving import CORNER, POLE
-from trigpoint_perception.core.publication import Said, numbered, output_boot_id
+from trigpoint_perception.core.publication import Said, Spoken, output_boot_id
 from trigpoint_perception.settings import PerceptionSettings
 
 STREAM = STREAM_PATTERNS[LandmarksPerceived]
@@ -77,7 +77,8 @@ def perceive_log(
     A sweep that cannot be used is told of with the reason, and the others go on; a drive that cannot be read or ended
     its workers costs no other. Raises AppendFailed, and once all others are done ServiceError for those drives.
     """
-    chosen, said, drives = settings or PerceptionSettings(), said_of(log), scanned_drives(log)
+    chosen, drives = settings or PerceptionSettings(), scanned_drives(log)
+    said, spoken = said_of(log)
     before = {drive.name: said.get(output_boot_id(*drive.name, chosen), Said()) for drive in drives}
     reports = {drive.name: _report(drive, before[drive.name], appended=0) for drive in drives}
     due = [drive for drive in drives if before[drive.name].sweeps != drive.sweeps]
@@ -91,7 +92,7 @@ def perceive_log(
             continue
         if not some.are_here:
             heard.more(drive.sweeps)
-        reports[drive.name] = _appended(log, drive, done.result, before[drive.name], chosen)
+        reports[drive.name] = _appended(log, drive, done.result, spoken, chosen)
     if failures:
         raise ServiceError(f"{len(failures)} of {len(due)} drives not perceived: {'; '.join(failures)}")
     return tuple(reports.values())
@@ -136,20 +137,22 @@ def sweep_counts(log: EventLog) -> Iterator[tuple[str, Mapping[tuple[str, str], 
         yield stream, counts
 
 
-def said_of(log: EventLog) -> dict[str, Said]:
-    """What perception has appended so far, by its own boots."""
+def said_of(log: EventLog) -> tuple[dict[str, Said], Spoken]:
+    """What perception has appended so far, by its own boots, and so that nothing is said twice."""
     said: dict[str, Said] = {}
+    spoken = Spoken({})
     for logged in log.read(STREAM, kinds=SWEEP_KINDS):
-        event = cast(SweepPerceived, logged.envelope.event)
-        said.setdefault(logged.envelope.identity.boot_id, Said()).add(event)
-    return said
+        row = cast(Envelope[SweepPerceived], logged.envelope)
+        said.setdefault(row.identity.boot_id, Said()).add(row.event)
+        spoken.add(row)
+    return said, spoken
 
 
 def _appended(
     log: EventLog,
     drive: ScannedDrive,
     told: Sequence[tuple[int, SweepPerceived]],
-    before: Said,
+    spoken: Spoken,
     settings: PerceptionSettings,
 ) -> DriveReport:
     """What was not there yet appended."""
@@ -157,16 +160,12 @@ def _appended(
     for _, event in told:
         whole.add(event)
     boot_id = output_boot_id(drive.vehicle, drive.boot_id, settings)
-    for first in range(before.count, len(told), APPENDED_TOGETHER):
-        _append(log, told[first : first + APPENDED_TOGETHER], boot_id=boot_id, first_sequence=first)
+    rows = spoken.fresh(told, boot_id=boot_id)
+    for first in range(0, len(rows), APPENDED_TOGETHER):
+        log.append(STREAM, cast(list[Envelope[Event]], list(rows[first : first + APPENDED_TOGETHER])))
     for reason, count in sorted(whole.refused.items()):
         logger.warning("drive %s of %s: %d sweeps refused: %s", drive.boot_id, drive.vehicle, count, reason)
-    return _report(drive, whole, appended=max(0, len(told) - before.count))
-
-
-def _append(log: EventLog, told: Sequence[tuple[int, SweepPerceived]], *, boot_id: str, first_sequence: int) -> None:
-    rows = numbered(told, boot_id=boot_id, first_sequence=first_sequence)
-    log.append(STREAM, cast(list[Envelope[Event]], list(rows)))
+    return _report(drive, whole, appended=len(rows))
 
 
 def _told(

@@ -127,7 +127,7 @@ def sharpness(log_path: Path, points: str, registered_by: str) -> Sharpness:
     assert wheels is not None  # OXTS is said to be the wheels
     placed = [_placed(sweep, points, wheels) for sweep in chosen]
     stamp_ns = np.array([sweep.stamp_ns for sweep in chosen], dtype=np.int64)
-    poses = _poses(drive.wheels, stamp_ns)
+    poses = _poses(wheels, stamp_ns)
     if registered_by == BY_LIDAR:
         odometry = LidarOdometry(SETTINGS.odometry)
         poses = _matched(odometry, placed, poses)

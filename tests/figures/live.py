@@ -7,12 +7,15 @@ from pathlib import Path
 from figures.figure import Bounds, Figure, Measurement, at_most
 from figures.workbench import Workbench
 from live_runs.campus_drives import Placed, UpdateTimes, update_times, without_receiver
+from live_runs.perceiving import PerceivedLive, perceived_live
 from live_runs.visibility import Visible, visible_within
 
 VEHICLES, POSES, SEED = 5, 10_000, 1
 SECONDS = 60.0
+PERCEIVED_SECONDS = 130.0  # the receiver needs a hundred of them to tell a heading
 UPDATES = f"live_runs.campus_drives.update_times(vehicles={VEHICLES}, poses={POSES}, seed={SEED})"
 VISIBLE = f"live_runs.visibility.visible_within(seconds={SECONDS:g}, seed={SEED})"
+PERCEIVED = f"live_runs.perceiving.perceived_live(seconds={PERCEIVED_SECONDS:g}, seed={SEED})"
 PLACED = f"live_runs.campus_drives.without_receiver(seed={SEED})"
 
 
@@ -29,6 +32,12 @@ def visible(folder: Path) -> Visible:
 
 
 @cache
+def perceived(folder: Path) -> PerceivedLive:
+    """A drive with a lidar in its own time."""
+    return perceived_live(folder / "perceived", seconds=PERCEIVED_SECONDS, seed=SEED)
+
+
+@cache
 def placed() -> Placed:
     """The second vehicle of the campus, its receiver taken away."""
     return without_receiver(seed=SEED)
@@ -42,6 +51,11 @@ def of_updates(bench: Workbench, *, value: Callable[[UpdateTimes], float]) -> Me
 def of_visible(bench: Workbench, *, value: Callable[[Visible], float]) -> Measurement:
     """A number of how soon landmarks are in the database."""
     return Measurement(value=value(visible(bench.folder)), command=VISIBLE)
+
+
+def of_perceived(bench: Workbench, *, value: Callable[[PerceivedLive], float]) -> Measurement:
+    """A number of the drive with a lidar."""
+    return Measurement(value=value(perceived(bench.folder)), command=PERCEIVED)
 
 
 def of_placed(bench: Workbench, *, value: Callable[[Placed], float]) -> Measurement:
@@ -71,6 +85,37 @@ FIGURES = (
         partial(of_visible, value=lambda found: found.p95_s),
     ),
     figure("the same, largest", "s", None, partial(of_visible, value=lambda found: found.most_s)),
+    figure(
+        "lidar, no detections: from a sweep in the log to its landmarks there, p95",
+        "s",
+        None,
+        partial(of_perceived, value=lambda found: found.said_p95_s),
+    ),
+    figure("the same, largest", "s", None, partial(of_perceived, value=lambda found: found.said_most_s)),
+    figure(
+        "lidar, no detections: perceiving a sweep, mean",
+        "s",
+        at_most(0.1),
+        partial(of_perceived, value=lambda found: found.sweep_s),
+    ),
+    figure(
+        "lidar, no detections: incremental update meanwhile, p99",
+        "ms",
+        at_most(100.0),
+        partial(of_perceived, value=lambda found: found.update_p99_ms),
+    ),
+    figure(
+        "lidar, no detections: landmarks in the growing map",
+        "1",
+        None,
+        partial(of_perceived, value=lambda found: float(found.landmarks)),
+    ),
+    figure(
+        "lidar, no detections: their median distance to a true one",
+        "m",
+        None,
+        partial(of_perceived, value=lambda found: found.off_m),
+    ),
     figure(
         "no receiver: mean error against truth",
         "m",

@@ -66,7 +66,7 @@ def visible_within(folder: Path, *, seconds: float, seed: int = 1) -> Visible:
     """A vehicle's drive into an empty map: the warm-up at once, then `seconds` of it in their own time."""
     campus, times = simulate_campus(seed, CampusSettings(vehicles=1)), Times()
     log = McapLog(folder / "log")
-    log.append(STREAM_PATTERNS[MapFramePinned], [_pinned(campus)])
+    log.append(STREAM_PATTERNS[MapFramePinned], [pinned_by(campus)])
     judged = [cast(Event, verdict) for verdict in accepted_fixes(campus, 0)]
     verdicts = [Envelope(EventIdentity("filtering", "run", n), 0, event) for n, event in enumerate(judged)]
     log.append("filtering", verdicts)
@@ -89,7 +89,8 @@ def visible_within(folder: Path, *, seconds: float, seed: int = 1) -> Visible:
     return _visible(times)
 
 
-def _pinned(campus: Campus) -> Envelope[Event]:
+def pinned_by(campus: Campus) -> Envelope[Event]:
+    """The frame of a campus."""
     frame = campus.frame
     event = MapFramePinned(
         crs=frame.crs,

@@ -126,7 +126,7 @@ class SecuredFleet:
 
 def secured_configuration(folder: Path, *, more: str = "") -> Fleet:
     """The configuration of a secured fleet, its services under the name `services`; `more` is added."""
-    processes = ("up", "router", "ingest", "filtering", "optimisation", "landmarks")
+    processes = ("up", "router", "ingest", "filtering", "perception", "optimisation", "landmarks")
     *numbers, last = free_ports(len(processes) + 1)
     fleet = Fleet(folder=folder, ports=dict(zip(processes, numbers, strict=True)), endpoint=f"tls/127.0.0.1:{last}")
     ports = "".join(f"{name}_port = {port}\n" for name, port in fleet.ports.items())

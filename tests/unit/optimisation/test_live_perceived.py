@@ -130,9 +130,10 @@ def grown(log: MemoryLog) -> list[LandmarkSolved]:
     fleet, perceived = LiveFleet(FRAME, SETTINGS), PerceivedLandmarks(log, first_number=0)
     measured = [cast(Envelope[Observed], row.envelope) for row in log.read("veh-car")]
     for first in range(0, len(measured), 500):
-        perceived.take(fleet)
+        perceived.take(fleet, measurements_wait=True)
         for row in measured[first : first + 500]:
             fleet.take(row)
+            perceived.begun(fleet)
         for verdict in all_accepted(measured[first : first + 500]):
             fleet.judged(verdict)
     while fleet.catch_up()[0]:
