@@ -55,10 +55,11 @@ class Piece:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GatheredPiece:
-    """The boxes (n, 4) of cells that each sweep hit, and the counts."""
+    """The boxes (n, 4) of cells that each sweep hit, the counts, and the tiles that got parts."""
 
     box: Ints
     counts: SweepCounts
+    tiles: frozenset[Tile]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,16 +81,16 @@ class PieceGathering:
                 box[row] = gatherer.box_of(sweep, stamp_ns)
                 if self.heard is not None:
                     self.heard(1)
-        gatherer.finish()
-        return GatheredPiece(box=box, counts=gatherer.counts)
+        return GatheredPiece(box=box, counts=gatherer.counts, tiles=gatherer.finished())
 
 
 class _SweepGatherer:
     """Adds sweeps of a piece to its parts and counts them."""
 
     def __init__(self, piece: Piece, frame: MapFrame, grid: RasterGrid, settings: TilesSettings) -> None:
-        hand_on = DriveParts(piece.folder).piece(piece.number).add
-        self._accumulator = Accumulator(memory_bytes=settings.memory_bytes, hand_on=hand_on, only=piece.only)
+        self._parts = DriveParts(piece.folder).piece(piece.number)
+        memory_bytes = settings.memory_bytes
+        self._accumulator = Accumulator(memory_bytes=memory_bytes, hand_on=self._parts.add, only=piece.only)
         self._limits = RangeLimits(least_m=settings.range_least_m, most_m=settings.range_most_m)
         self._placer = SweepPlacer(frame, grid, reach_m=settings.range_most_m, deskew=settings.deskew)
         self._path: DrivenPath | None = piece.clouds.path
@@ -112,6 +113,7 @@ class _SweepGatherer:
         )
         return NOTHING_HIT if found.box is None else np.array(found.box, dtype=np.int64)
 
-    def finish(self) -> None:
-        """Everything handed on to the parts."""
+    def finished(self) -> frozenset[Tile]:
+        """The tiles that got parts, once everything is handed on."""
         self._accumulator.finish()
+        return self._parts.tiles

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from trigpoint.errors import ServiceError
 from trigpoint.geodesy.projection import MapFrame
 from trigpoint_tiles.clouds import DriveClouds
 from trigpoint_tiles.core.grid import RasterGrid, Tile
@@ -31,6 +32,7 @@ class DrivePlan:
         boxes there are filled in. only: the tiles that change, None for all."""
         self.parts, self._clouds, self._record, self._only, self._rows = parts, clouds, record, only, rows
         self._left = -(-len(rows) // PIECE_SWEEPS)
+        self._written = frozenset[Tile]()
         self.counts = SweepCounts(kept_from_before=len(record.sequence) - len(rows))
 
     @property
@@ -51,12 +53,17 @@ class DrivePlan:
             yield Piece(clouds=some, number=number, first=first, folder=self.parts.folder, only=self._only)
 
     def take(self, piece: Piece, gathered: GatheredPiece) -> None:
-        """One more piece is gathered."""
+        """One more piece is gathered. Raises ServiceError where its parts are not to be seen from here."""
         self._record.box[self._rows[piece.first : piece.first + len(gathered.box)]] = gathered.box
         self.counts.add(gathered.counts)
+        self._written |= gathered.tiles
         self._left -= 1
-        if not self._left:
-            self.parts.finish(self._record)
+        if self._left:
+            return
+        if unseen := self._written - self.parts.tiles():
+            told = f"{len(unseen)} of {len(self._written)} tiles that workers wrote are not here"
+            raise ServiceError(f"{self.parts.folder}: {told}: all of them need to see this folder")
+        self.parts.finish(self._record)
 
 
 class DrivePlanner:

@@ -85,6 +85,11 @@ class PieceParts:
         self._folder, self._number = folder, number
         self._counts: Counter[Tile] = Counter()
 
+    @property
+    def tiles(self) -> frozenset[Tile]:
+        """The tiles that got a part."""
+        return frozenset(self._counts)
+
     def add(self, tile: Tile, cells: Cells) -> None:
         """One more part of a tile, there as a whole or not at all."""
         path = self._folder / f"{tile.column}_{tile.row}" / f"{self._number}_{self._counts[tile]}{ENDING}"
