@@ -11,6 +11,7 @@ from figures.figure import Bounds, Figure, Measurement, at_most
 from figures.lidar_campus import DRIVE, SEED
 from figures.workbench import Outcome, Workbench
 from perceived_campus.sights import SightErrors, sight_errors
+from trigpoint.events.drives import Drive
 from trigpoint.events.truth import truth_from_lines
 from trigpoint.geodesy.projection import map_points_from_wgs84
 from trigpoint.logs.mcap_log import McapLog
@@ -27,10 +28,15 @@ DRIVES = replace(DRIVE, vehicles=2, carried=replace(DRIVE.carried, landmarks=Fal
 SOLVED = SolveSettings(method="anchored")
 HELD_M = 1e-6  # 1-sigma of a range offset that is not solved for
 LITTLE = 1e-3  # of the variance: as good as none
+WITHOUT_ODOMETRY = replace(SOLVED, matched=MatchedSettings(used=False))
+GAPS = "landmarks in 40 of 120 s only"
+SEEN_NS, TURN_NS = 40_000_000_000, 120_000_000_000
 VARIANTS = {
-    "lidar odometry left out": replace(SOLVED, matched=MatchedSettings(used=False)),
+    "lidar odometry left out": WITHOUT_ODOMETRY,
     "range offsets held at zero": replace(SOLVED, calibration=CalibrationPriors(range_offset_m=HELD_M)),
     "no error shared by a pass": replace(SOLVED, detections=DetectionSettings(shared_share=LITTLE)),
+    GAPS: SOLVED,
+    f"{GAPS}, lidar odometry left out": WITHOUT_ODOMETRY,
 }
 
 
@@ -71,14 +77,20 @@ def of_map(bench: Workbench, *, path: str) -> Measurement:
     return Measurement(value=errors.at(path), command=f"{errors.command}  # two vehicles on loops of 2 to 2.4 km")
 
 
+def with_gaps(drive: Drive) -> Drive:
+    """The drive with landmarks for `SEEN_NS` of every `TURN_NS` only."""
+    since_ns = drive.detections.stamp_ns - drive.wheels.stamp_ns[0]
+    return replace(drive, detections=drive.detections.chosen(np.nonzero(since_ns % TURN_NS < SEEN_NS)[0]))
+
+
 @cache
 def solved_otherwise(data: Path, truth: Path, variant: str) -> LandmarkTruthEvaluation:
     """The errors of the same drives' map by other settings."""
     log = McapLog(data / "log")
-    frame = logged_frame(log)
-    solution = solve_map(
-        logged_drives(log), logged_anchors(log), frame, VARIANTS[variant], verdicts=logged_verdicts(log)
-    )
+    frame, drives = logged_frame(log), logged_drives(log)
+    if variant.startswith(GAPS):
+        drives = tuple(with_gaps(drive) for drive in drives)
+    solution = solve_map(drives, logged_anchors(log), frame, VARIANTS[variant], verdicts=logged_verdicts(log))
     with truth.open(encoding="utf-8") as lines:
         known = truth_from_lines(lines).landmarks
     lat_deg, lon_deg = np.array([one.lat_deg for one in known]), np.array([one.lon_deg for one in known])

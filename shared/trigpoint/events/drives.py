@@ -81,6 +81,19 @@ class DetectionSeries:
     sequence: Ints
     covariance_m2: Floats | None = None
 
+    def chosen(self, rows: Ints) -> "DetectionSeries":
+        """The detections of some rows, by index."""
+        return DetectionSeries(
+            stamp_ns=self.stamp_ns[rows],
+            range_m=self.range_m[rows],
+            bearing_rad=self.bearing_rad[rows],
+            diameter_m=self.diameter_m[rows],
+            kind=tuple(self.kind[row] for row in rows),
+            signature=tuple(self.signature[row] for row in rows),
+            sequence=self.sequence[rows],
+            covariance_m2=None if self.covariance_m2 is None else self.covariance_m2[rows],
+        )
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionSeries:
@@ -139,8 +152,8 @@ NO_LOOPS = LoopSeries(other=(), motions=NO_MOTIONS)
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
     """Everything one vehicle measured in one boot, and what was perceived in its points. Each series is sorted by time,
-    not by arrival. `matched`: the base's motions from sweep to sweep, by matching points; `loops`: places known again.
-    """
+    not by arrival. `matched`: the base's motions from sweep to sweep, by matching points, sensor by sensor; `loops`:
+    places known again."""
 
     vehicle: str
     boot_id: str

@@ -24,9 +24,10 @@ def with_perceived(drives: Iterable[Drive], log: EventLog) -> tuple[Drive, ...]:
     """The drives with what perception found in their sweeps: its landmarks among the detections, each named by its
     sweep's sequence, the motions it matched, and the loops it closed.
 
-    Where a drive was perceived, or its loops sought, more than once, by other settings, the last time counts. What the
-    vehicle itself detected stands back where perception found something: both saw the same things. Its detections with
-    a signature stay, other vehicles' too; and a camera's, beside which nothing that was perceived counts.
+    Where a drive was perceived, or its loops sought, more than once, by other settings, the last time counts. Where
+    perception found something in a drive, what the vehicle itself detected from the first to the last perceived sweep
+    stands back: both saw the same things. Its detections with a signature stay, other vehicles' too; and a camera's,
+    beside which nothing that was perceived counts.
     """
     drives = tuple(drives)
     names = {(drive.vehicle, drive.boot_id) for drive in drives}
@@ -61,7 +62,9 @@ def _completed(drive: Drive, told: Sequence[Envelope[Perceived]]) -> Drive:
     matched = [(row.stamp_ns, row.event) for row in told if isinstance(row.event, OdometryMatched)]
     detections = drive.detections
     if any(event.landmarks for _, event in swept) and drive.described.landmark_sensor_model != CAMERA:
-        detections = _joined(_signed(drive.detections), _perceived_series(swept, drive.described))
+        stamps_ns = [stamp_ns for stamp_ns, _ in swept]
+        own = _standing(drive.detections, from_ns=min(stamps_ns), until_ns=max(stamps_ns))
+        detections = _joined(own, _perceived_series(swept, drive.described))
     return replace(drive, detections=detections, matched=_motion_series(matched))
 
 
@@ -86,41 +89,33 @@ def _perceived_series(swept: Iterable[tuple[int, LandmarksPerceived]], described
     )
 
 
-def _signed(series: DetectionSeries) -> DetectionSeries:
-    """The detections that say what they are of."""
-    rows = [row for row, signature in enumerate(series.signature) if signature]
-    return DetectionSeries(
-        stamp_ns=series.stamp_ns[rows],
-        range_m=series.range_m[rows],
-        bearing_rad=series.bearing_rad[rows],
-        diameter_m=series.diameter_m[rows],
-        kind=tuple(series.kind[row] for row in rows),
-        signature=tuple(series.signature[row] for row in rows),
-        sequence=series.sequence[rows],
-    )
+def _standing(series: DetectionSeries, *, from_ns: int, until_ns: int) -> DetectionSeries:
+    """The detections that say what they are of, and those outside the time."""
+    outside = (series.stamp_ns < from_ns) | (series.stamp_ns > until_ns)
+    signed = np.array([bool(signature) for signature in series.signature], dtype=bool)
+    return series.chosen(np.nonzero(outside | signed)[0])
 
 
 def _joined(own: DetectionSeries, perceived: DetectionSeries) -> DetectionSeries:
     """Both in order of time; NaN covariances of those that have none."""
-    order = np.argsort(np.concatenate([own.stamp_ns, perceived.stamp_ns]), kind="stable")
-    kind, signature = own.kind + perceived.kind, own.signature + perceived.signature
-    none = np.full((len(own.stamp_ns), 2, 2), np.nan)
     assert perceived.covariance_m2 is not None, "perception tells a covariance of each"
-    return DetectionSeries(
-        stamp_ns=np.concatenate([own.stamp_ns, perceived.stamp_ns])[order],
-        range_m=np.concatenate([own.range_m, perceived.range_m])[order],
-        bearing_rad=np.concatenate([own.bearing_rad, perceived.bearing_rad])[order],
-        diameter_m=np.concatenate([own.diameter_m, perceived.diameter_m])[order],
-        kind=tuple(kind[row] for row in order),
-        signature=tuple(signature[row] for row in order),
-        sequence=np.concatenate([own.sequence, perceived.sequence])[order],
-        covariance_m2=np.concatenate([none, perceived.covariance_m2])[order],
+    none = np.full((len(own.stamp_ns), 2, 2), np.nan)
+    both = DetectionSeries(
+        stamp_ns=np.concatenate([own.stamp_ns, perceived.stamp_ns]),
+        range_m=np.concatenate([own.range_m, perceived.range_m]),
+        bearing_rad=np.concatenate([own.bearing_rad, perceived.bearing_rad]),
+        diameter_m=np.concatenate([own.diameter_m, perceived.diameter_m]),
+        kind=own.kind + perceived.kind,
+        signature=own.signature + perceived.signature,
+        sequence=np.concatenate([own.sequence, perceived.sequence]),
+        covariance_m2=np.concatenate([none, perceived.covariance_m2]),
     )
+    return both.chosen(np.argsort(both.stamp_ns, kind="stable"))
 
 
 def _motion_series(matched: Iterable[tuple[int, OdometryMatched]]) -> MotionSeries:
-    """Motions from sweep to sweep in order of time."""
-    rows = sorted(matched, key=lambda row: row[0])
+    """Motions from sweep to sweep, sensor by sensor in order of time."""
+    rows = sorted(matched, key=lambda row: (row[1].sensor, row[0]))
     if not rows:
         return NO_MOTIONS
     return MotionSeries(

@@ -1,6 +1,7 @@
 """What was perceived becomes detections of its drive."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -73,11 +74,11 @@ def detected(sequence: int, *signatures: str, stamp_ns: int = 1_000) -> Envelope
     return Envelope(EventIdentity("van", "boot-1", sequence), stamp_ns, LandmarksDetected(detections=seen))
 
 
-def matched(told_as: str, sequence: int) -> Envelope[Event]:
+def matched(told_as: str, sequence: int, *, sensor: str = "roof") -> Envelope[Event]:
     event = OdometryMatched(
         vehicle="van",
         boot_id="boot-1",
-        sensor="roof",
+        sensor=sensor,
         from_sequence=sequence - 1,
         from_stamp_ns=1_000 + sequence - 1,
         sweep_sequence=sequence,
@@ -98,10 +99,17 @@ def test_a_perceived_landmark_keeps_its_covariance_in_the_base_frame(log: Memory
 
 
 def test_what_the_vehicle_detected_stands_back_where_something_was_perceived(log: MemoryLog) -> None:
-    log.append("veh-van", [detected(1, "")])
+    log.append("veh-van", [detected(1, "", stamp_ns=1_008)])
+    log.append(PERCEIVED_STREAM, [perceived("one", 7), perceived("one", 9)])
+    (drive,) = logged_drives(log)
+    assert drive.detections.sequence.tolist() == [7, 9]
+
+
+def test_what_the_vehicle_detected_counts_as_long_as_its_sweeps_are_not_perceived(log: MemoryLog) -> None:
+    log.append("veh-van", [detected(1, "", stamp_ns=1_006), detected(2, "", stamp_ns=1_008)])
     log.append(PERCEIVED_STREAM, [perceived("one", 7)])
     (drive,) = logged_drives(log)
-    assert drive.detections.sequence.tolist() == [7]
+    assert drive.detections.sequence.tolist() == [1, 7, 2]
 
 
 def test_a_drive_in_which_nothing_was_perceived_keeps_what_it_detected(log: MemoryLog) -> None:
@@ -135,3 +143,11 @@ def test_motions_by_matched_points_belong_to_their_drive(log: MemoryLog) -> None
     assert (drive.matched.from_stamp_ns.tolist(), drive.matched.stamp_ns.tolist()) == ([1_007, 1_008], [1_008, 1_009])
     assert drive.matched.motion.tolist() == [[0.5, 0.8, 0.01], [0.5, 0.9, 0.01]]
     assert drive.matched.covariance[0].tolist() == np.diag([0.01, 0.02, 0.0001]).tolist()
+
+
+def test_motions_of_two_sensors_do_not_break_one_anothers_chain(log: MemoryLog) -> None:
+    rows = [matched("one", 6), matched("one", 6, sensor="front"), matched("one", 7), matched("one", 7, sensor="front")]
+    numbered = [replace(row, identity=replace(row.identity, sequence=n)) for n, row in enumerate(rows)]
+    log.append(PERCEIVED_STREAM, numbered)
+    (drive,) = logged_drives(log)
+    assert drive.matched.from_stamp_ns.tolist() == [1_005, 1_006, 1_005, 1_006]
