@@ -98,21 +98,23 @@ def _figure(name: str, unit: str, target: Bounds | None, value: Callable[[Closed
 FIGURES = (
     _figure("campus, places proposed by landmarks", "1", None, lambda found: found.proposed),
     _figure("campus, loops verified by points", "1", at_least(50.0), lambda found: found.verified),
-    _figure("the same, wrong (off by over 0.5 m or 2 degrees)", "1", at_most(0.0), lambda found: found.judged.wrong),
-    _figure("the same, error, mean", "m", None, lambda found: found.judged.error_m.mean()),
-    _figure("the same, error, p95", "m", None, lambda found: np.quantile(found.judged.error_m, 0.95)),
-    _figure("the same, error, largest", "m", None, lambda found: found.judged.error_m.max()),
-    _figure("the same, NEES over 3", "1", at_most(1.5), lambda found: found.judged.nees.mean() / 3.0),
+    _figure(
+        "campus, loops wrong (off by over 0.5 m or 2 degrees)", "1", at_most(0.0), lambda found: found.judged.wrong
+    ),
+    _figure("campus, error of loops, mean", "m", None, lambda found: found.judged.error_m.mean()),
+    _figure("campus, error of loops, p95", "m", None, lambda found: np.quantile(found.judged.error_m, 0.95)),
+    _figure("campus, error of loops, largest", "m", None, lambda found: found.judged.error_m.max()),
+    _figure("campus, loops, NEES over 3", "1", at_most(1.5), lambda found: found.judged.nees.mean() / 3.0),
     _figure("without landmarks, no loops: one drive off the other", "m", None, lambda found: found.apart.apart_m),
-    _figure("the same, error of the paths", "m", None, lambda found: found.apart.path_m),
+    _figure("without landmarks, no loops: error of the paths", "m", None, lambda found: found.apart.path_m),
     _figure("with half the loops, off at the other half", "m", at_most(0.2), lambda found: found.together.apart_m),
-    _figure("the same, error of the paths", "m", None, lambda found: found.together.path_m),
+    _figure("with half the loops, error of the paths", "m", None, lambda found: found.together.path_m),
     _figure("30 % of the loops wrong, off at the other half", "m", at_most(0.2), lambda found: found.misled.apart_m),
     _figure(
-        "the same, error of the paths over that with right ones",
+        "30 % of the loops wrong, error of the paths over that with right ones",
         "1",
         at_most(1.1),
         lambda found: found.misled.path_m / found.together.path_m,
     ),
-    _figure("loops, processor time over the drives'", "1", at_most(0.5), lambda found: found.time_share),
+    _figure("campus, loops: processor time over the drives'", "1", at_most(0.5), lambda found: found.time_share),
 )

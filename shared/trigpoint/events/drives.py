@@ -153,8 +153,7 @@ NO_LOOPS = LoopSeries(other=(), motions=NO_MOTIONS)
 class Drive:
     """Everything one vehicle measured in one boot, and what was perceived in its points. Each series is sorted by time,
     not by arrival. `matched`: the base's motions from sweep to sweep, by matching points, sensor by sensor; `loops`:
-    places known again.
-    """
+    places known again."""
 
     vehicle: str
     boot_id: str

@@ -220,6 +220,13 @@ def test_a_place_whose_points_cannot_be_used_is_refused_and_the_others_go_on() -
     assert {each.refusal for each in found} == {"empty sweep"}
 
 
+@pytest.mark.parametrize("left", [slice(0, 0), slice(2, 3), slice(3, None)])  # none, the middle alone, all but it
+def test_points_that_were_retained_away_are_said_to_be_gone(left: slice) -> None:
+    run = run_along(OUT, STREET.pole_m, boot_id="out")
+    with pytest.raises(EventRejected, match="points gone"):
+        cloud_around(sweeps("out")[left], run, 2, SETTINGS.verification, PerceptionSettings())
+
+
 def test_the_sweeps_of_a_cloud_are_spread_about_its_middle() -> None:
     run = run_along(along(0.0, 60.0, aside_m=0.0), STREET.pole_m, boot_id="a")
     rows = rows_around(run, 30, SETTINGS.verification)

@@ -7,18 +7,21 @@ import numpy as np
 import small_gicp
 from numpy.typing import NDArray
 
+from trigpoint.errors import EventRejected
 from trigpoint_perception.core.closures.runs import Run
 from trigpoint_perception.core.closures.settings import VerificationSettings
 from trigpoint_perception.core.deskew import deskewed, planar_path
 from trigpoint_perception.core.following import NumberedSweep
 from trigpoint_perception.core.ground import heights_above_ground
 from trigpoint_perception.core.kept_map import NEIGHBOURS
-from trigpoint_perception.core.odometry import LidarOdometry
+from trigpoint_perception.core.odometry import LidarOdometry, Match
 from trigpoint_perception.core.sweep import Sweep, usable_sweep
 from trigpoint_perception.settings import PerceptionSettings
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+SWEEPS_MIN = 2  # one alone says nothing of how well it lies
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,25 +51,31 @@ def cloud_around(
     """The cloud around a sweep, from the sweeps of `rows_around` in their order.
 
     Each is deskewed by the run's path and matched to those before it. Raises EventRejected for a sweep that is not
-    usable.
+    usable, and "points gone" where the middle one is missing or alone.
     """
-    path = planar_path(run.stamp_ns, run.pose)
-    odometry = LidarOdometry(chosen.odometry)
-    placed: list[tuple[Floats, Floats, Floats]] = []
-    T_odom_middle, covariance = np.eye(4), np.zeros((3, 3))
-    last, T_odom_last = int(np.searchsorted(run.sequence, sweeps[0].sequence)), np.eye(4)
-    for numbered in sweeps:
-        at = int(np.searchsorted(run.sequence, numbered.sequence))
+    path, odometry = planar_path(run.stamp_ns, run.pose), LidarOdometry(chosen.odometry)
+    rows = np.searchsorted(run.sequence, [numbered.sequence for numbered in sweeps]).tolist()
+    if row not in rows or len(rows) < SWEEPS_MIN:
+        raise EventRejected("points gone", f"{len(rows)} sweeps around sweep {int(run.sequence[row])}, or not it")
+    placed: list[_PlacedSweep] = []
+    for at, numbered in zip(rows, sweeps, strict=True):
         sweep = usable_sweep(numbered.scanned, chosen.sweep)
         still_m = deskewed(sweep.point_m, sweep.offset_ns, stamp_ns=numbered.stamp_ns, path=path)
-        sweep = replace(sweep, point_m=still_m)
-        match = odometry.matched(still_m, T_odom_last @ _moved(run.pose[last], run.pose[at]))
-        last, T_odom_last = at, match.T_odom_base
-        if at == row:
-            T_odom_middle, covariance = T_odom_last, match.covariance
-        placed.append((T_odom_last, *_near(sweep, settings, chosen)))
-    points, tree, upright_m = _merged(placed, np.asarray(np.linalg.inv(T_odom_middle), dtype=np.float64), settings)
-    return Cloud(points=points, tree=tree, upright_m=upright_m, covariance=covariance)
+        moved = _moved(run.pose[rows[len(placed) - 1]], run.pose[at]) if placed else np.eye(4)
+        match = odometry.matched(still_m, placed[-1].match.T_odom_base @ moved if placed else moved)
+        placed.append(_PlacedSweep(match, *_near(replace(sweep, point_m=still_m), settings, chosen)))
+    middle = rows.index(row)
+    points, tree, upright_m = _merged(placed, np.linalg.inv(placed[middle].match.T_odom_base), settings)
+    return Cloud(points=points, tree=tree, upright_m=upright_m, covariance=placed[max(middle, 1)].match.covariance)
+
+
+@dataclass(frozen=True, slots=True)
+class _PlacedSweep:
+    """A sweep's place among the others, its points (n, 3) within range, and those of them well above the ground."""
+
+    match: Match
+    point_m: Floats
+    upright_m: Floats
 
 
 def _near(sweep: Sweep, settings: VerificationSettings, chosen: PerceptionSettings) -> tuple[Floats, Floats]:
@@ -77,16 +86,19 @@ def _near(sweep: Sweep, settings: VerificationSettings, chosen: PerceptionSettin
 
 
 def _merged(
-    placed: Sequence[tuple[Floats, Floats, Floats]], T_middle_odom: Floats, settings: VerificationSettings
+    placed: Sequence[_PlacedSweep], T_middle_odom: NDArray[np.floating], settings: VerificationSettings
 ) -> tuple[small_gicp.PointCloud, small_gicp.KdTree, Floats]:
     """All points and the upright ones (u, 3), thinned, at the middle sweep."""
     points, upright = [], []
-    for T_odom_base, point_m, upright_m in placed:
-        T_middle_base = T_middle_odom @ T_odom_base
-        points.append(point_m @ T_middle_base[:3, :3].T + T_middle_base[:3, 3])
-        upright.append(upright_m @ T_middle_base[:3, :3].T + T_middle_base[:3, 3])
+    for each in placed:
+        T_middle_base = T_middle_odom @ each.match.T_odom_base
+        points.append(each.point_m @ T_middle_base[:3, :3].T + T_middle_base[:3, 3])
+        upright.append(each.upright_m @ T_middle_base[:3, :3].T + T_middle_base[:3, 3])
     cloud, tree = small_gicp.preprocess_points(np.vstack(points), settings.downsampled_m, NEIGHBOURS, 1)
-    thinned = small_gicp.voxelgrid_sampling(np.vstack(upright), settings.downsampled_m)
+    upright_m = np.vstack(upright)
+    if not len(upright_m):
+        return cloud, tree, upright_m
+    thinned = small_gicp.voxelgrid_sampling(upright_m, settings.downsampled_m)
     return cloud, tree, np.asarray(thinned.points())[:, :3]
 
 
