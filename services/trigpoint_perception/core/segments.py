@@ -72,7 +72,7 @@ def ordered_sweep(sweep: Sweep, height_m: Floats) -> OrderedSweep:
         azimuth_rad=azimuth_rad,
         run_m=sweep.run_m[row],
         height_m=height_m[row],
-        point_m=sweep.point_m[row],
+        point_m=np.take(sweep.point_m, row, axis=0),
         step_rad=float(np.median(step)) if len(step) else 2.0 * np.pi,
     )
 

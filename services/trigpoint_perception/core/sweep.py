@@ -60,8 +60,9 @@ def usable_sweep(scanned: PointsScanned, settings: SweepSettings) -> Sweep:
     _check_count(count, settings)
     rotation = _checked_rotation(scanned, settings)
     limits_m = np.array([settings.range_min_m, settings.range_max_m])
-    taken = _taken(np.array(scanned.point_m, dtype=np.float64), rotation, limits_m)
-    row, own_m, direction_m, azimuth_rad, run_m = taken
+    sensor_m = np.array(scanned.sensor_position_m, dtype=np.float64)
+    taken = _taken(np.array(scanned.point_m, dtype=np.float64), rotation, sensor_m, limits_m)
+    row, own_m, base_m, azimuth_rad, run_m = taken
     if len(row) < settings.points_min:
         raise EventRejected(
             "no usable points",
@@ -69,22 +70,24 @@ def usable_sweep(scanned: PointsScanned, settings: SweepSettings) -> Sweep:
             f"{settings.range_max_m:g} m: at least {settings.points_min} are needed",
         )
     return Sweep(
-        point_m=direction_m + scanned.sensor_position_m,
+        point_m=base_m,
         azimuth_rad=azimuth_rad,
         run_m=run_m,
         offset_ns=scanned.offset_ns[row].astype(np.int64),
         ring=_rings_by_elevation(own_m, scanned.ring[row]),
-        sensor_m=np.asarray(scanned.sensor_position_m, dtype=np.float64),
+        sensor_m=sensor_m,
         dropped=count - len(row),
     )
 
 
 @compiled
-def _taken(point_m: Floats, rotation: Floats, limits_m: Floats) -> tuple[Ints, Floats, Floats, Floats, Floats]:
-    """The rows (m,) of points (n, 3) within range, themselves (m, 3), turned into the base's axes (m, 3), and their
-    azimuths and horizontal distances (m,)."""
+def _taken(
+    point_m: Floats, rotation: Floats, sensor_m: Floats, limits_m: Floats
+) -> tuple[Ints, Floats, Floats, Floats, Floats]:
+    """The rows (m,) of points (n, 3) within range, themselves (m, 3) and in the base frame (m, 3), and their azimuths
+    and horizontal distances (m,) from the sensor in the base's axes."""
     size = len(point_m)
-    row, own, turned = np.empty(size, np.int64), np.empty((size, 3)), np.empty((size, 3))
+    row, own, base = np.empty(size, np.int64), np.empty((size, 3)), np.empty((size, 3))
     azimuth, run = np.empty(size), np.empty(size)
     least, most = limits_m[0] ** 2, limits_m[1] ** 2
     kept = 0
@@ -93,12 +96,14 @@ def _taken(point_m: Floats, rotation: Floats, limits_m: Floats) -> tuple[Ints, F
         if least <= x * x + y * y + z * z <= most:  # NaN is not
             row[kept] = number
             own[kept, 0], own[kept, 1], own[kept, 2] = x, y, z
-            for axis in range(3):
-                turned[kept, axis] = rotation[axis, 0] * x + rotation[axis, 1] * y + rotation[axis, 2] * z
-            azimuth[kept] = np.arctan2(turned[kept, 1], turned[kept, 0])
-            run[kept] = np.sqrt(turned[kept, 0] ** 2 + turned[kept, 1] ** 2)
+            ahead = rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z
+            left = rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z
+            up = rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z
+            base[kept, 0], base[kept, 1], base[kept, 2] = ahead + sensor_m[0], left + sensor_m[1], up + sensor_m[2]
+            azimuth[kept] = np.arctan2(left, ahead)
+            run[kept] = np.sqrt(ahead * ahead + left * left)
             kept += 1
-    return row[:kept], own[:kept], turned[:kept], azimuth[:kept], run[:kept]
+    return row[:kept], own[:kept], base[:kept], azimuth[:kept], run[:kept]
 
 
 def _check_count(count: int, settings: SweepSettings) -> None:

@@ -41,6 +41,13 @@ def test_every_corner_is_found_and_nothing_else(sensor: Sensor) -> None:
     assert nearest_m(corners, CORNERS_M).max() < 0.1  # the last column's gap to the edge, at 14 m
 
 
+def test_a_corner_far_away_is_found() -> None:
+    away = np.array([[46.0, 0.0, 55.0, 9.0, 8.0], [46.0, 0.0, 55.0, -9.0, 8.0]])  # four rings hit it
+    corners = seen(World(cylinders=np.zeros((0, 4)), walls=away), SIXTEEN, "corner")
+    assert nearest_m(corners, away[:1, :2]).max() < 0.2  # a column is 0.16 m wide there
+    assert len(corners) == 1
+
+
 @BOTH
 def test_a_radius_is_measured(sensor: Sensor) -> None:
     (pole,) = seen(World(cylinders=np.array([[8.0, 2.0, 0.25, 6.0]]), walls=NO_WALLS), sensor, "pole")
