@@ -3,20 +3,19 @@
 import os
 import shutil
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
 from trigpoint.errors import InputError
-from trigpoint.logs.mcap_log import McapLog
 from trigpoint.workers import workers
 from trigpoint_cli.build import map_values
 from trigpoint_cli.data_dir import DataDirectory
 from trigpoint_cli.ingest import ingest_values
 from trigpoint_cli.live import ingest_live
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering, metres
+from trigpoint_cli.perceive import perceived
 from trigpoint_cli.pipeline import Built, build_map
 from trigpoint_cli.report import write_report
 from trigpoint_cli.truth_values import truth_lines, truth_values
@@ -24,7 +23,6 @@ from trigpoint_evaluation.app import TruthEvaluation
 from trigpoint_ingest.anchor_files import read_anchor_file
 from trigpoint_ingest.anchors import import_anchors
 from trigpoint_ingest.core.tally import IngestReport
-from trigpoint_perception.app import perceive_log
 from trigpoint_vehicle.aerial_files import write_viewer_configuration
 from trigpoint_vehicle.app import record_campus
 from trigpoint_vehicle.settings import SimulationSettings
@@ -64,8 +62,8 @@ def command(out: Path, *, aerial: bool, screen: Screen, **simulated: Any) -> Ans
             ingested = ingest_live(logs, log, progress)
         import_anchors(read_anchor_file(data.anchors), log)
         if settings.lidar:
-            with workers() as some, screen.part_of("perceiving") as progress:
-                perceive_log(log, partial(McapLog, data.log), some=some, progress=progress)
+            with workers() as some:
+                perceived(log, data, some, screen)
         built = build_map(data, log, screen, method="anchored")
         found = write_report(data, log, screen, truth_path=data.truth, built=built)
     assert found is not None, "truth was written above"

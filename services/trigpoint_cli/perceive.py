@@ -6,7 +6,8 @@ import click
 
 from trigpoint.errors import InputError
 from trigpoint.logs.mcap_log import McapLog
-from trigpoint.workers import workers
+from trigpoint.logs.ports import EventLog
+from trigpoint.workers import Workers, workers
 from trigpoint_cli.data_dir import DataDirectory, cluster_option, data_option
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering, counted
 from trigpoint_perception.app import DriveReport, perceive_log
@@ -24,12 +25,8 @@ def command(data: DataDirectory, *, cluster: str, screen: Screen) -> Answer:
     Sweeps that cannot be used are counted by reason, kept with it in the log, and end the command with status 2 after
     everything else was done.
     """
-    open_log = partial(McapLog, data.log.absolute())
     with data.opened_log() as log, workers(cluster) as some:
-        with screen.part_of("perceiving") as progress:
-            reports = perceive_log(log, open_log, some=some, progress=progress)
-        with screen.part_of("closing loops") as progress:
-            loops = close_loops(log, open_log, some=some, progress=progress)
+        reports, loops = perceived(log, data, some, screen)
     if not reports:
         raise InputError(f"{data.log}: no drive has lidar sweeps, or all that have are excluded")
     complaints = tuple(
@@ -43,6 +40,17 @@ def command(data: DataDirectory, *, cluster: str, screen: Screen) -> Answer:
         "appended": sum(one.appended for one in reports) + sum(one.appended for one in loops),
     }
     return Answer(values, (*map(_line, reports), *map(_loop_line, loops)), complaints)
+
+
+def perceived(
+    log: EventLog, data: DataDirectory, some: Workers, screen: Screen
+) -> tuple[tuple[DriveReport, ...], tuple[LoopReport, ...]]:
+    """What every drive's sweeps show, and the loops they close, appended to the log."""
+    open_log = partial(McapLog, data.log.absolute())
+    with screen.part_of("perceiving") as progress:
+        reports = perceive_log(log, open_log, some=some, progress=progress)
+    with screen.part_of("closing loops") as progress:
+        return reports, close_loops(log, open_log, some=some, progress=progress)
 
 
 def _item(one: DriveReport) -> JsonObject:
