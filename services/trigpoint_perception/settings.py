@@ -80,7 +80,7 @@ class OdometrySettings:
     """How sweeps are matched; tuned on KITTI 0005 and on streets of the simulated campus."""
 
     voxel_m: float = 1.0
-    downsampled_m: float = 0.75
+    downsampled_m: float = 0.85
     reach_m: float = 1.0  # between a point and its partner
     share_min: float = 0.3  # of points with a partner
     sigma_max_m: float = 0.5  # along the loosest direction
