@@ -1,7 +1,7 @@
 """What perception found, as part of the drives it was found in: detections with their covariances, motions, loops."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from typing import cast
 
@@ -29,19 +29,17 @@ def with_perceived(drives: Iterable[Drive], log: EventLog) -> tuple[Drive, ...]:
     stands back: both saw the same things. Its detections with a signature stay, other vehicles' too; and a camera's,
     beside which nothing that was perceived counts.
     """
-    drives = tuple(drives)
-    names = {(drive.vehicle, drive.boot_id) for drive in drives}
-    told = _last_told(log, names, (LandmarksPerceived, OdometryMatched))
-    loops = _last_told(log, names, (LoopClosed,))
+    by_name = {(drive.vehicle, drive.boot_id): drive for drive in drives}
+    told = _last_told(log, by_name.keys(), (LandmarksPerceived, OdometryMatched))
+    loops = _last_told(log, by_name.keys(), (LoopClosed,))
     return tuple(
         replace(_completed(drive, told.get(name, ())), loops=_loop_series(loops.get(name, ())))
-        for drive in drives
-        for name in ((drive.vehicle, drive.boot_id),)
+        for name, drive in by_name.items()
     )
 
 
 def _last_told(
-    log: EventLog, names: set[DriveName], kinds: Sequence[type]
+    log: EventLog, names: Collection[DriveName], kinds: Sequence[type]
 ) -> dict[DriveName, list[Envelope[Perceived]]]:
     """What was told of each named drive, of some kinds of events, under the boot that told of it last."""
     told: dict[DriveName, list[Envelope[Perceived]]] = {}
