@@ -178,5 +178,5 @@ FIGURES = (
     _tied("the same: landmark error, mean", "m", 1, "error_m.mean"),
     _tied("the same: NEES of each landmark", "per axis", 1, "nees_per_dof_each"),
     _tied("measured again on that map: landmark error, mean", "m", 2, "error_m.mean"),
-    _tied("the same: NEES of each landmark", "per axis", 2, "nees_per_dof_each"),
+    _tied("measured again on that map: NEES of each landmark", "per axis", 2, "nees_per_dof_each"),
 )
