@@ -91,7 +91,12 @@ FIGURES = (
         None,
         partial(of_perceived, value=lambda found: found.said_p95_s),
     ),
-    figure("the same of landmarks perceived, largest", "s", None, partial(of_perceived, value=lambda found: found.said_most_s)),
+    figure(
+        "the same of landmarks perceived, largest",
+        "s",
+        None,
+        partial(of_perceived, value=lambda found: found.said_most_s),
+    ),
     figure(
         "lidar, no detections: perceiving a sweep, mean",
         "s",
