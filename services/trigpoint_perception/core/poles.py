@@ -198,7 +198,7 @@ class _Scene:
         arc = Arc(
             point_m=self.ordered.point_m[rows, :2],
             viewpoint_m=self.sensor_m[:2],
-            width_m=self.segments.width_m[chosen],
+            width_rad=self.segments.width_m[chosen] / self.segments.near_m[chosen],
             step_rad=self.ordered.step_rad,
         )
         return fitted_circle(arc, range_sigma_m=self.settings.range_sigma_m, radius_max_m=self.settings.radius_max_m)
