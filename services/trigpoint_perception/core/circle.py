@@ -45,7 +45,8 @@ def fitted_circle(arc: Arc, *, range_sigma_m: float, radius_max_m: float) -> Cir
 
     Gauss-Newton on geometric distances (Huber's weights) with the angular width as a measurement of the radius: from
     one side alone the points hardly tell a large circle from a near one, and the covariance says so. Its scale is the
-    larger of the sensor's noise and the residuals found; neighbours' errors are taken as shared, the width's are its own.
+    larger of the sensor's noise and the residuals found. Neighbours' errors are taken as shared, the width's are its
+    own; noise is along the rays, so that the middle between the edges tells the direction best.
     """
     fitted = _fitted(arc.point_m, arc.viewpoint_m, arc.width_rad, np.array([arc.step_rad, range_sigma_m, radius_max_m]))
     state, covariance, residual_m = fitted
@@ -64,7 +65,10 @@ def _fitted(point_m: Floats, viewpoint_m: Floats, width_rad: Floats, limits: Flo
     step_rad, sigma_m, radius_max_m = limits
     sight_m = np.array([point_m[:, 0].mean(), point_m[:, 1].mean()]) - viewpoint_m
     away_m = np.hypot(sight_m[0], sight_m[1])
-    seen_m, prior_sigma_m = _radius(width_rad, step_rad, away_m)
+    edges_rad = _edges_sigma_rad(width_rad, step_rad)
+    seen_m, prior_sigma_m = _radius(width_rad, step_rad, edges_rad, away_m)
+    left = np.array([-sight_m[1], sight_m[0]]) / away_m
+    across_sigma_m = 0.5 * away_m * edges_rad
     prior_m = min(max(seen_m, RADIUS_MIN_M), radius_max_m)
     state = np.empty(3)
     state[:2] = viewpoint_m + sight_m * (1.0 + MEAN_DEPTH * prior_m / away_m)
@@ -76,6 +80,11 @@ def _fitted(point_m: Floats, viewpoint_m: Floats, width_rad: Floats, limits: Flo
         information, gradient = information / shared, gradient / shared
         information[2, 2] += 1.0 / prior_sigma_m**2
         gradient[2] += (state[2] - prior_m) / prior_sigma_m**2
+        across_m = left[0] * (state[0] - viewpoint_m[0]) + left[1] * (state[1] - viewpoint_m[1])
+        for one in range(2):
+            gradient[one] += left[one] * across_m / across_sigma_m**2
+            for other in range(2):
+                information[one, other] += left[one] * left[other] / across_sigma_m**2
         information[0, 0] += 1e-6 / prior_sigma_m**2  # solvable where all points lie in one direction
         information[1, 1] += 1e-6 / prior_sigma_m**2
         state = state - np.linalg.solve(information, gradient)
@@ -89,17 +98,23 @@ def _fitted(point_m: Floats, viewpoint_m: Floats, width_rad: Floats, limits: Flo
 
 
 @compiled
-def _radius(width_rad: Floats, step_rad: float, away_m: float) -> tuple[float, float]:
+def _edges_sigma_rad(width_rad: Floats, step_rad: float) -> float:
+    """1-sigma of a width by where beams happen to fall on its edges."""
+    ordered = np.sort(width_rad)
+    count = len(ordered)
+    spread_rad = 0.74 * (ordered[(3 * count) // 4] - ordered[count // 4])
+    return float(max(step_rad / np.sqrt(6.0), spread_rad) / np.sqrt(count))
+
+
+@compiled
+def _radius(width_rad: Floats, step_rad: float, edges_rad: float, away_m: float) -> tuple[float, float]:
     """The radius in m that an object covers and its 1-sigma.
 
     Lines of sight that touch a cylinder do so beyond its front. Beams fall at random on the two edges, alike for no two
     rings; they touch an object early, alike for all rings, by nothing to their full width.
     """
-    ordered = np.sort(width_rad)
-    count = len(ordered)
-    spread_rad = 0.74 * (ordered[(3 * count) // 4] - ordered[count // 4])
-    sigma_rad = np.hypot(max(step_rad / np.sqrt(6.0), spread_rad) / np.sqrt(count), DIVERGENCE_RAD / np.sqrt(12.0))
-    covered = np.sin(0.5 * min(max(ordered[count // 2] + step_rad - 0.5 * DIVERGENCE_RAD, 0.0), 1.0))
+    sigma_rad = np.hypot(edges_rad, DIVERGENCE_RAD / np.sqrt(12.0))
+    covered = np.sin(0.5 * min(max(np.median(width_rad) + step_rad - 0.5 * DIVERGENCE_RAD, 0.0), 1.0))
     return away_m * covered / (1.0 - MEAN_DEPTH * covered), 0.5 * np.hypot(away_m * sigma_rad, SYSTEMATIC_SIGMA_M)
 
 
