@@ -80,11 +80,7 @@ def _fitted(point_m: Floats, viewpoint_m: Floats, width_rad: Floats, limits: Flo
         information, gradient = information / shared, gradient / shared
         information[2, 2] += 1.0 / prior_sigma_m**2
         gradient[2] += (state[2] - prior_m) / prior_sigma_m**2
-        across_m = left[0] * (state[0] - viewpoint_m[0]) + left[1] * (state[1] - viewpoint_m[1])
-        for one in range(2):
-            gradient[one] += left[one] * across_m / across_sigma_m**2
-            for other in range(2):
-                information[one, other] += left[one] * left[other] / across_sigma_m**2
+        _add_direction(information, gradient, left / across_sigma_m, state[:2] - viewpoint_m)
         information[0, 0] += 1e-6 / prior_sigma_m**2  # solvable where all points lie in one direction
         information[1, 1] += 1e-6 / prior_sigma_m**2
         state = state - np.linalg.solve(information, gradient)
@@ -95,6 +91,17 @@ def _fitted(point_m: Floats, viewpoint_m: Floats, width_rad: Floats, limits: Flo
     for axis in range(3):
         covariance[axis, axis] += SYSTEMATIC_SIGMA_M**2
     return state, covariance, residual_m
+
+
+@compiled
+def _add_direction(information: Floats, gradient: Floats, weighted_left: Floats, centre_m: Floats) -> None:
+    """Put in that the axis, at centre_m (2,) from the sensor, is behind the middle between the edges; weighted_left
+    (2,): to the left of there, over the 1-sigma."""
+    across = weighted_left[0] * centre_m[0] + weighted_left[1] * centre_m[1]
+    for one in range(2):
+        gradient[one] += weighted_left[one] * across
+        for other in range(2):
+            information[one, other] += weighted_left[one] * weighted_left[other]
 
 
 @compiled
