@@ -20,12 +20,12 @@ SHARED_POINTS = 9.0  # neighbours' errors go together (a surface's reflectivity 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arc:
-    """Points (n, 2) of an upright cylinder seen from `viewpoint_m` (2,), and the widths (k,) its k segments span as
-    seen from there, neighbouring beams `step_rad` apart."""
+    """Points (n, 2) of an upright cylinder seen from `viewpoint_m` (2,), and the angles (k,) its k segments span there,
+    neighbouring beams `step_rad` apart."""
 
     point_m: Floats
     viewpoint_m: Floats
-    width_m: Floats
+    width_rad: Floats
     step_rad: float
 
 
@@ -45,9 +45,10 @@ def fitted_circle(arc: Arc, *, range_sigma_m: float, radius_max_m: float) -> Cir
 
     Gauss-Newton on geometric distances (Huber's weights) with the angular width as a measurement of the radius: from
     one side alone the points hardly tell a large circle from a near one, and the covariance says so. Its scale is the
-    larger of the sensor's noise and the residuals found; neighbours' errors are taken as shared.
+    larger of the sensor's noise and the residuals found. Neighbours' errors are taken as shared, the width's are its
+    own; noise is along the rays, so that the middle between the edges tells the direction best.
     """
-    fitted = _fitted(arc.point_m, arc.viewpoint_m, arc.width_m, np.array([arc.step_rad, range_sigma_m, radius_max_m]))
+    fitted = _fitted(arc.point_m, arc.viewpoint_m, arc.width_rad, np.array([arc.step_rad, range_sigma_m, radius_max_m]))
     state, covariance, residual_m = fitted
     return Circle(
         centre_m=state[:2],
@@ -59,42 +60,69 @@ def fitted_circle(arc: Arc, *, range_sigma_m: float, radius_max_m: float) -> Cir
 
 
 @compiled
-def _fitted(point_m: Floats, viewpoint_m: Floats, width_m: Floats, limits: Floats) -> tuple[Floats, Floats, float]:
+def _fitted(point_m: Floats, viewpoint_m: Floats, width_rad: Floats, limits: Floats) -> tuple[Floats, Floats, float]:
     """Centre and radius (3,), their covariance (3, 3), the residual; limits (3,): step, range's sigma, radius."""
     step_rad, sigma_m, radius_max_m = limits
     sight_m = np.array([point_m[:, 0].mean(), point_m[:, 1].mean()]) - viewpoint_m
     away_m = np.hypot(sight_m[0], sight_m[1])
-    across_m, across_sigma_m = _width(width_m, step_rad * away_m, away_m)
-    prior_m = min(max(0.5 * across_m, RADIUS_MIN_M), radius_max_m)
+    edges_rad = _edges_sigma_rad(width_rad, step_rad)
+    seen_m, prior_sigma_m = _radius(width_rad, step_rad, edges_rad, away_m)
+    left = np.array([-sight_m[1], sight_m[0]]) / away_m
+    across_sigma_m = 0.5 * away_m * edges_rad
+    prior_m = min(max(seen_m, RADIUS_MIN_M), radius_max_m)
     state = np.empty(3)
     state[:2] = viewpoint_m + sight_m * (1.0 + MEAN_DEPTH * prior_m / away_m)
     state[2] = prior_m
     information = np.eye(3)
+    shared = min(SHARED_POINTS, len(point_m))
     for _ in range(ITERATIONS):
         information, gradient = _normal_equations(point_m, state, sigma_m)
-        information[2, 2] += 4.0 / across_sigma_m**2  # of a radius, half a width
-        gradient[2] += (state[2] - prior_m) * 4.0 / across_sigma_m**2
-        information[0, 0] += 1e-6 / across_sigma_m**2  # solvable where all points lie in one direction
-        information[1, 1] += 1e-6 / across_sigma_m**2
+        information, gradient = information / shared, gradient / shared
+        information[2, 2] += 1.0 / prior_sigma_m**2
+        gradient[2] += (state[2] - prior_m) / prior_sigma_m**2
+        _add_direction(information, gradient, left / across_sigma_m, state[:2] - viewpoint_m)
+        information[0, 0] += 1e-6 / prior_sigma_m**2  # solvable where all points lie in one direction
+        information[1, 1] += 1e-6 / prior_sigma_m**2
         state = state - np.linalg.solve(information, gradient)
         state[2] = min(max(state[2], RADIUS_MIN_M), radius_max_m)
     away = np.sqrt((point_m[:, 0] - state[0]) ** 2 + (point_m[:, 1] - state[1]) ** 2) - state[2]
     residual_m = np.sqrt((away**2).mean())
-    covariance = np.linalg.inv(information) * max(1.0, (residual_m / sigma_m) ** 2) * min(SHARED_POINTS, len(away))
-    covariance[2, 2] = min(covariance[2, 2], 0.25 * across_sigma_m**2)
+    covariance = np.linalg.inv(information) * max(1.0, (residual_m / sigma_m) ** 2)
     for axis in range(3):
         covariance[axis, axis] += SYSTEMATIC_SIGMA_M**2
     return state, covariance, residual_m
 
 
 @compiled
-def _width(width_m: Floats, beam_m: float, away_m: float) -> tuple[float, float]:
-    """The width in m and its 1-sigma: beams fall at random on the two edges, and touch an object half a beam early."""
-    ordered = np.sort(width_m)
+def _add_direction(information: Floats, gradient: Floats, weighted_left: Floats, centre_m: Floats) -> None:
+    """Put in that the axis, at centre_m (2,) from the sensor, is behind the middle between the edges; weighted_left
+    (2,): to the left of there, over the 1-sigma."""
+    across = weighted_left[0] * centre_m[0] + weighted_left[1] * centre_m[1]
+    for one in range(2):
+        gradient[one] += weighted_left[one] * across
+        for other in range(2):
+            information[one, other] += weighted_left[one] * weighted_left[other]
+
+
+@compiled
+def _edges_sigma_rad(width_rad: Floats, step_rad: float) -> float:
+    """1-sigma of a width by where beams happen to fall on its edges."""
+    ordered = np.sort(width_rad)
     count = len(ordered)
-    spread_m = 0.74 * (ordered[(3 * count) // 4] - ordered[count // 4])
-    sigma_m = np.hypot(max(beam_m / np.sqrt(6.0), spread_m) / np.sqrt(count), SYSTEMATIC_SIGMA_M)
-    return ordered[count // 2] + beam_m - 0.5 * DIVERGENCE_RAD * away_m, sigma_m
+    spread_rad = 0.74 * (ordered[(3 * count) // 4] - ordered[count // 4])
+    return float(max(step_rad / np.sqrt(6.0), spread_rad) / np.sqrt(count))
+
+
+@compiled
+def _radius(width_rad: Floats, step_rad: float, edges_rad: float, away_m: float) -> tuple[float, float]:
+    """The radius in m that an object covers and its 1-sigma.
+
+    Lines of sight that touch a cylinder do so beyond its front. Beams fall at random on the two edges, alike for no two
+    rings; they touch an object early, alike for all rings, by nothing to their full width.
+    """
+    sigma_rad = np.hypot(edges_rad, DIVERGENCE_RAD / np.sqrt(12.0))
+    covered = np.sin(0.5 * min(max(np.median(width_rad) + step_rad - 0.5 * DIVERGENCE_RAD, 0.0), 1.0))
+    return away_m * covered / (1.0 - MEAN_DEPTH * covered), 0.5 * np.hypot(away_m * sigma_rad, SYSTEMATIC_SIGMA_M)
 
 
 @compiled

@@ -28,6 +28,7 @@ TRUNK_RADIUS_M = 0.17  # thicker than any lamp post
 PANEL_WIDTH_M = (0.25, 1.3)
 PANEL_HEIGHT_M = (1.2, 4.5)
 PANEL_RATIO = 2.0  # times the pole's own width
+NARROW_QUANTILE = 0.25  # of the widths of a pole's rings: narrow as the pole is where a panel hides most of it
 PANEL_RINGS = 2
 PANEL_REACH_M = 0.4  # from the pole's axis to the panel's middle
 PERSON_RADIUS_M = 0.08
@@ -152,7 +153,7 @@ class _Scene:
         chosen, rings = upright
         height_m = self.segments.mean_height_m[chosen]
         low = chosen[height_m <= AXIS_HEIGHT_M]
-        circle = self._circle(low if len(low) >= self.settings.rings_min else chosen)
+        circle = self._circle(self._shaft(low if len(low) >= self.settings.rings_min else chosen))
         if circle.residual_m > 2.5 * self.settings.range_sigma_m:
             return None
         bottom_m, top_m, points = float(height_m.min()), float(height_m.max()), int(self.segments.count[chosen].sum())
@@ -184,13 +185,20 @@ class _Scene:
         filled = rings >= limits.filled_share_min * span
         return (chosen[near], rings) if standing and tall and straight and filled else None
 
+    def _shaft(self, chosen: Ints) -> Ints:
+        """Of a pole's segments those no panel or arm on it widens: its axis is not behind the middle of a panel."""
+        beam_m = self.ordered.step_rad * self.segments.near_m[chosen]
+        width_m = self.segments.width_m[chosen] + beam_m
+        narrow_m = np.quantile(width_m, NARROW_QUANTILE, method="lower")
+        return chosen[width_m < PANEL_RATIO * narrow_m + 1.5 * beam_m]
+
     def _circle(self, chosen: Ints) -> Circle:
         ordered, segments = self.ordered, self.segments
         rows = _rows(segments.first[chosen], segments.count[chosen], segments.ring[chosen], ordered.ring_begin)
         arc = Arc(
             point_m=self.ordered.point_m[rows, :2],
             viewpoint_m=self.sensor_m[:2],
-            width_m=self.segments.width_m[chosen],
+            width_rad=self.segments.width_m[chosen] / self.segments.near_m[chosen],
             step_rad=self.ordered.step_rad,
         )
         return fitted_circle(arc, range_sigma_m=self.settings.range_sigma_m, radius_max_m=self.settings.radius_max_m)
