@@ -66,7 +66,9 @@ def perceived_poles(
         return ()
     centre_m = _segment_centres(segments, thin, sensor_m)
     scene = _Scene(ordered, segments, sensor_m, settings, _slope_top(ordered, sensor_m), _flanking(ordered))
-    poles = [scene.pole_of(thin[rows], centre_m[rows]) for rows in _stacks(centre_m, settings)]
+    poles = [
+        scene.pole_of(thin[rows], centre_m[rows]) for rows in _stacks(centre_m, segments.mean_height_m[thin], settings)
+    ]
     return tuple(pole for pole in poles if pole is not None)
 
 
@@ -88,13 +90,20 @@ def _segment_centres(segments: Segments, thin: Ints, sensor_m: Floats) -> Floats
     return sensor_m[:2] + np.column_stack([out_m * np.cos(angle), out_m * np.sin(angle)])
 
 
-def _stacks(centre_m: Floats, settings: PoleSettings) -> list[Ints]:
-    """Rows of segments that are linked by nearness, in groups of enough rings."""
+def _stacks(centre_m: Floats, height_m: Floats, settings: PoleSettings) -> list[Ints]:
+    """Rows of segments (m,) that are linked by nearness, in groups of enough rings that reach down and up as far as a
+    pole does."""
     label = _linked(centre_m, np.argsort(centre_m[:, 0], kind="stable"), settings.link_m)
     size = np.bincount(label, minlength=len(label))
     rows = np.nonzero(size[label] >= settings.rings_min)[0]
+    if not len(rows):
+        return []
     rows = rows[np.argsort(label[rows], kind="stable")]
-    return np.split(rows, np.nonzero(np.diff(label[rows]))[0] + 1) if len(rows) else []
+    begin = np.concatenate([[0], np.nonzero(np.diff(label[rows]))[0] + 1])
+    low_m, high_m = np.minimum.reduceat(height_m[rows], begin), np.maximum.reduceat(height_m[rows], begin)
+    upright = (low_m <= settings.bottom_max_m) & (high_m >= settings.top_min_m)
+    upright &= high_m - low_m >= settings.extent_min_m
+    return [rows for rows, kept in zip(np.split(rows, begin[1:]), upright, strict=True) if kept]
 
 
 @compiled
@@ -189,7 +198,7 @@ class _Scene:
         """Of a pole's segments those no panel or arm on it widens: its axis is not behind the middle of a panel."""
         beam_m = self.ordered.step_rad * self.segments.near_m[chosen]
         width_m = self.segments.width_m[chosen] + beam_m
-        narrow_m = np.quantile(width_m, NARROW_QUANTILE, method="lower")
+        narrow_m = float(np.sort(width_m)[int(NARROW_QUANTILE * (len(width_m) - 1))])
         return chosen[width_m < PANEL_RATIO * narrow_m + 1.5 * beam_m]
 
     def _circle(self, chosen: Ints) -> Circle:
