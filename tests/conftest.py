@@ -24,6 +24,15 @@ def recorded_drives() -> Path:
 
 
 @pytest.fixture(scope="session")
+def viewer_built() -> None:
+    """The viewer's page is built; ask for it in tests marked `browser`."""
+    from viewed_maps.browser import missing
+
+    if missing():
+        pytest.skip(missing())
+
+
+@pytest.fixture(scope="session")
 def postgis() -> Iterator["Cluster"]:
     """A PostgreSQL server with PostGIS, for this run only; ask for it in tests marked `postgis`."""
     from landmark_databases.cluster import binaries, running_cluster

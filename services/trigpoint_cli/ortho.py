@@ -162,7 +162,8 @@ def _registration_options(function: Callable[..., Any]) -> Callable[..., Any]:
 @answering
 def register(ortho: Path, image: Path, *, reach_m: float, out: Path | None, screen: Screen) -> Answer:
     """Measure where an aerial image shows the ground, less where the ortho layer has it, tile by tile."""
-    found = register_image(ortho, image, reach_m=reach_m)
+    with screen.part_of("registering tiles") as progress:
+        found = register_image(ortho, image, reach_m=reach_m, progress=progress)
     if out is not None:
         _write(out, check_layer(found, image=image.stem))
     shift_m, covariance_m2 = found.joined()
@@ -215,7 +216,8 @@ def anchors(
     known_as = asked["image"].stem if name is None else name
     if not known_as:
         raise InputError(f"--image {asked['image']}: it has no name of its own; give it one with --name")
-    found = register_image(**asked)
+    with screen.part_of("registering tiles") as progress:
+        found = register_image(**asked, progress=progress)
     with data.opened_log() as log:
         measured = anchors_by_image(log, found)
         by = attributed(author, f"measured in {known_as} on map version {found.map_version}")

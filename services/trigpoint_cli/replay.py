@@ -1,6 +1,6 @@
 """`trigpoint replay`: every projection made again from the log and held against the one that is there."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
@@ -34,42 +34,62 @@ def command(data: tuple[DataDirectory, ...], *, restore: bool, cluster: str, scr
     Several data directories are replayed side by side, by threads or a cluster's workers; one that cannot be read
     costs no other.
     """
-    if len(data) > 1 or cluster:
-        return _side_by_side(data, restore=restore, cluster=cluster, screen=screen)
-    with ExitStack() as bars:
-        values = _replayed(data[0], restore=restore, progress_of=lambda what: bars.enter_context(screen.part_of(what)))
+    if len(data) > 1:
+        return _several(data, _side_by_side(data, restore=restore, cluster=cluster, screen=screen))
+    if cluster:
+        (values,) = _side_by_side(data, restore=restore, cluster=cluster, screen=screen).values()
+    else:
+        with ExitStack() as bars:
+            part_of = partial(_shown, bars, screen)
+            values = _replayed(data[0], restore=restore, progress_of=part_of)
+    if "error" in values:
+        raise InputError(values["error"])
     late = (f"{stream}: the log begins at number {number}, not at 0" for stream, number in values["begins_at"].items())
     restored = values["restored_versions"]
     lines = (*late, *((f"{len(restored)} map versions restored",) if restored else ()))
     return Answer(values, lines if values["differences"] else (*lines, "no difference"), _complaints(values))
 
 
-def _side_by_side(data: Sequence[DataDirectory], *, restore: bool, cluster: str, screen: Screen) -> Answer:
-    """Each data directory's own answer. Raises ServiceError, once all are done, for those the environment failed."""
+def _shown(bars: ExitStack, screen: Screen, what: str) -> Progress:
+    return bars.enter_context(screen.part_of(what))
+
+
+def _several(data: Sequence[DataDirectory], answers: Mapping[str, JsonObject]) -> Answer:
+    """Each data directory's own answer, in the order they were named in."""
+    each = [{"data": path, **answers[path]} for path in (str(one.path.absolute()) for one in data)]
+    differences = sum(one.get("differences", 0) for one in each)
+    lines = tuple(f"{one['data']}: {counted(one['differences'], 'difference')}" for one in each if "differences" in one)
+    complaints = tuple(f"{one['data']}: {complaint}" for one in each for complaint in _complaints(one))
+    return Answer({"data": each, "differences": differences}, lines, complaints)
+
+
+def _side_by_side(
+    data: Sequence[DataDirectory], *, restore: bool, cluster: str, screen: Screen
+) -> Mapping[str, JsonObject]:
+    """What was found in each data directory, or the "error" that it could not be read with, by its path.
+
+    Raises ServiceError, once all are done, for those the environment failed.
+    """
     due = {str(one.path.absolute()): one for one in data}
     if len(due) < len(data):
         raise InputError(f"--data: {len(data)} given, {len(due)} of them different; each is replayed once")
     if len(data) > 1 and data[0].asked.url is not None:
         raise InputError(f"--database names one landmark database, --data {len(data)} directories: each has its own")
-    each: list[JsonObject] = []
+    answers: dict[str, JsonObject] = {}
     failures: list[str] = []
     with workers(cluster) as some, screen.part_of("replaying") as progress:
         for done in some.each(partial(_replayed_at, restore=restore), due.items()):
             path = done.item[0]
             if done.result is not None:
-                each.append({"data": path, **done.result})
+                answers[path] = done.result
             elif isinstance(done.error, InputError):
-                each.append({"data": path, "error": str(done.error)})
+                answers[path] = {"error": str(done.error)}
             else:
                 failures.append(f"{path}: {done.error}")
-            progress(len(each) + len(failures), len(due))
+            progress(len(answers) + len(failures), len(due))
     if failures:
         raise ServiceError(f"{len(failures)} of {len(due)} logs not replayed: {'; '.join(failures)}")
-    each.sort(key=lambda one: list(due).index(one["data"]))
-    differences = sum(one.get("differences", 0) for one in each)
-    lines = tuple(f"{one['data']}: {counted(one['differences'], 'difference')}" for one in each if "differences" in one)
-    complaints = tuple(f"{one['data']}: {complaint}" for one in each for complaint in _complaints(one))
-    return Answer({"data": each, "differences": differences}, lines, complaints)
+    return answers
 
 
 def _replayed_at(at: tuple[str, DataDirectory], *, restore: bool) -> JsonObject:

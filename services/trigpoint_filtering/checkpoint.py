@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from trigpoint.geodesy.projection import MapFrame
-from trigpoint.logs.checkpoints import read_checkpoint, write_checkpoint
+from trigpoint.logs.checkpoints import read_checkpoint
 from trigpoint_filtering.core.fleet_following import FleetFollower
 from trigpoint_filtering.settings import FilterSettings
 
@@ -21,11 +21,6 @@ class Progress:
     taken: Mapping[str, int]
     fleet: FleetFollower
     form: int = FORM
-
-
-def write_progress(path: Path, progress: Progress) -> None:
-    """The file replaced as a whole; a crash leaves the one before. Raises OSError."""
-    write_checkpoint(path, progress)
 
 
 def read_progress(path: Path, *, frame: MapFrame, settings: FilterSettings) -> Progress | None:

@@ -17,13 +17,14 @@ from trigpoint.events.estimated import Estimated, FixJudged
 from trigpoint.events.keys import DEFAULT_ROOT, KEY_VERSION, key_of
 from trigpoint.events.observed import Observed
 from trigpoint.geodesy.projection import MapFrame
+from trigpoint.logs.checkpoints import write_checkpoint
 from trigpoint.logs.following import StreamFollower
 from trigpoint.logs.ports import RecallingLog
-from trigpoint.logs.readings import VEHICLE_PREFIX, pinned_frame, vehicle_streams
+from trigpoint.logs.readings import is_vehicle_stream, pinned_frame, vehicle_streams
 from trigpoint.observability.backlog import Backlog
 from trigpoint.observability.metrics import Instruments
 from trigpoint_filtering.app import KINDS, STREAM
-from trigpoint_filtering.checkpoint import Progress, read_progress, write_progress
+from trigpoint_filtering.checkpoint import Progress, read_progress
 from trigpoint_filtering.core.fleet_following import KEPT_BOOTS, DriveName, FleetFollower
 from trigpoint_filtering.core.follower import REORDER_NS
 from trigpoint_filtering.core.publication import output_boot_id
@@ -61,7 +62,7 @@ class LiveFiltering:
         self._settings = settings or FilterSettings()
         self._instruments = instruments or Instruments("filtering")
         self._said = _said_before(log)
-        self._streams = StreamFollower(log, _is_vehicle, kinds=KINDS)
+        self._streams = StreamFollower(log, is_vehicle_stream, kinds=KINDS)
         self._fleet: FleetFollower | None = None
         self._backlog = Backlog(self._instruments)
         self._closed = False
@@ -105,7 +106,7 @@ class LiveFiltering:
         taken = self._streams.checkpoint
         try:
             kept = Progress(frame=fleet.frame, settings=self._settings, taken=dict(taken), fleet=fleet)
-            write_progress(self._checkpoint, kept)
+            write_checkpoint(self._checkpoint, kept)
         except OSError as error:
             logger.warning("%s: no checkpoint written: %s", self._checkpoint, error)
 
@@ -117,7 +118,7 @@ class LiveFiltering:
         if frame is not None and self._checkpoint is not None:
             kept = read_progress(self._checkpoint, frame=frame, settings=self._settings)
         if kept is not None:
-            self._streams = StreamFollower(self._log, _is_vehicle, checkpoint=kept.taken, kinds=KINDS)
+            self._streams = StreamFollower(self._log, is_vehicle_stream, checkpoint=kept.taken, kinds=KINDS)
             return kept.fleet
         return None if frame is None else FleetFollower(frame, self._settings, ended=tuple(self._whole_drives(frame)))
 
@@ -173,10 +174,6 @@ class LiveFiltering:
             self.close()
         else:
             self._news.close()
-
-
-def _is_vehicle(stream: str) -> bool:
-    return stream.startswith(VEHICLE_PREFIX)
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,8 +31,8 @@ from trigpoint.logs.perceived_readings import PERCEIVED_STREAM
 from trigpoint.logs.ports import EventLog
 from trigpoint.logs.readings import (
     LABEL_STREAM,
-    VEHICLE_PREFIX,
     VERDICT_STREAM,
+    is_vehicle_stream,
     logged_corrections,
     pinned_frame,
 )
@@ -141,7 +141,9 @@ class LiveOptimisation:
         self._fleet = LiveFleet(
             frame, self._settings, base=state.landmarks, starts=state.starts, excluded=self._excluded
         )
-        self._measured = StreamFollower(self._log, _is_vehicle, checkpoint=state.vehicle_numbers, kinds=DRIVE_KINDS)
+        self._measured = StreamFollower(
+            self._log, is_vehicle_stream, checkpoint=state.vehicle_numbers, kinds=DRIVE_KINDS
+        )
         self._judged = StreamFollower(
             self._log, [VERDICT_STREAM], checkpoint={VERDICT_STREAM: state.verdict_number}, kinds=(FixJudged,)
         )
@@ -354,10 +356,6 @@ def _some(events: Iterator[Mapped]) -> Iterator[Mapped]:
         parts += len(event.stamp_ns) if isinstance(event, TrajectorySolved) else 0
         if parts > TOGETHER_PARTS:
             return
-
-
-def _is_vehicle(stream: str) -> bool:
-    return stream.startswith(VEHICLE_PREFIX)
 
 
 def _run_id(place: DrivePlace) -> str:

@@ -101,8 +101,8 @@ class Search:
 
 
 def closing_boot_id(vehicle: str, boot_id: str, settings: ClosureSettings) -> str:
-    """The boot under which a drive's loops are numbered: the same for the same drive and settings."""
-    digest = hashlib.sha256(f"loops|{vehicle}|{boot_id}|{settings}".encode()).hexdigest()[:12]
+    """The boot under which a drive's loops are numbered: the same for the same drive and settings, perception's too."""
+    digest = hashlib.sha256(f"loops|{vehicle}|{boot_id}|{settings}|{PerceptionSettings()}".encode()).hexdigest()[:12]
     return f"{vehicle[:40]}-{digest}"
 
 

@@ -16,10 +16,11 @@ from trigpoint.events.envelope import Envelope
 from trigpoint.events.keys import DEFAULT_ROOT, KEY_VERSION, key_of
 from trigpoint.events.observed import Observed
 from trigpoint.events.perceived import LandmarksPerceived, SweepPerceived
+from trigpoint.events.scanned import PointsScanned
 from trigpoint.logs.checkpoints import write_checkpoint
 from trigpoint.logs.following import StreamFollower
 from trigpoint.logs.ports import EventLog
-from trigpoint.logs.readings import VEHICLE_PREFIX
+from trigpoint.logs.readings import is_vehicle_stream
 from trigpoint.observability.backlog import Backlog
 from trigpoint.observability.metrics import Instruments
 from trigpoint_perception.app import KINDS, STREAM, SWEEP_KINDS, sweep_counts
@@ -31,6 +32,7 @@ from trigpoint_perception.settings import PerceptionSettings
 LOOK_S = 0.5  # between two looks at the log when nobody tells of news
 BATCH = 16  # events decoded at a time: a sweep takes a megabyte, the largest twenty
 QUIET_S = 5.0  # after a drive's last event, when all is taken: what waits for later sweeps is then given out
+ENDED = "drive had ended"  # a sweep that came so late: `trigpoint perceive` takes it
 CHECKPOINT_S = 10.0  # between two checkpoints: so much is perceived again after a crash
 
 logger = logging.getLogger(__name__)
@@ -76,7 +78,7 @@ class LivePerception:
             self._spoken.add(cast(Envelope[SweepPerceived], logged.envelope))
         self._fleet = kept.fleet if kept else FleetFollower(self._settings, ended=tuple(self._whole_drives()))
         taken = kept.taken if kept else {}
-        self._streams = StreamFollower(self._log, _is_vehicle, checkpoint=taken, kinds=KINDS)
+        self._streams = StreamFollower(self._log, is_vehicle_stream, checkpoint=taken, kinds=KINDS)
         logger.info("going on", extra={"from_checkpoint": kept is not None})
 
     def _whole_drives(self) -> Iterator[DriveName]:
@@ -107,7 +109,10 @@ class LivePerception:
         logged = self._streams.take(BATCH)
         rows = [cast(Envelope[Observed], row.envelope) for row in logged]
         for row in rows:
-            self._heard_s[row.identity.source, row.identity.boot_id] = self._now_s()
+            name = (row.identity.source, row.identity.boot_id)
+            self._heard_s[name] = self._now_s()
+            if isinstance(row.event, PointsScanned) and self._fleet.has_ended(name):
+                self._instruments.rejected.labels(row.identity.source, ENDED).inc()
         self._append(told for row in rows for told in self._timed(partial(self._fleet.take, row)))
         self._backlog.show(taken=sum(self._streams.checkpoint.values()), lag_events=self._streams.lag)
         if logged and self._now_s() >= self._kept_s + CHECKPOINT_S:
@@ -184,7 +189,3 @@ class LivePerception:
             self.close()
         else:
             self._news.close()
-
-
-def _is_vehicle(stream: str) -> bool:
-    return stream.startswith(VEHICLE_PREFIX)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trigpoint.errors import InputError
+from trigpoint.logs.readings import Progress, in_silence
 from trigpoint_tiles.core.image_tiles import ImageRegistration, TileRegistration, agreeing
 from trigpoint_tiles.core.registration import REACH_M, registered, unknown
 from trigpoint_tiles.core.rendering import BANDS, HEIGHT_ABOVE_M, REFLECTIVITY
@@ -21,9 +22,11 @@ MEAN_FROM = 1.5  # pixels in one a side, from which their mean is taken
 COVERED_LEAST = 0.1  # of a tile, by both
 
 
-def register_image(ortho: Path, image: Path, *, reach_m: float = REACH_M) -> ImageRegistration:
+def register_image(
+    ortho: Path, image: Path, *, reach_m: float = REACH_M, progress: Progress = in_silence
+) -> ImageRegistration:
     """An image's shift against an ortho layer of `trigpoint ortho render`, on the coarser one's pixels, by up to
-    `reach_m` either way.
+    `reach_m` either way; `progress` is told of tiles.
 
     Raises InputError for a file that is no raster, has no CRS or not these bands, and where they do not overlap.
     """
@@ -31,14 +34,15 @@ def register_image(ortho: Path, image: Path, *, reach_m: float = REACH_M) -> Ima
         reflectivity, height = _band(layer, BANDS[REFLECTIVITY].name), _band(layer, BANDS[HEIGHT_ABOVE_M].name)
         whole = layer.place
         pixel_m = whole.pixel_m * _pixels_in_one(whole.pixel_m, picture.ground_pixel_m(whole))
-        tiles = []
-        for place in _places(whole.within(picture.bounds_on(whole)), pixel_m):
+        tiles, places = [], list(_places(whole.within(picture.bounds_on(whole)), pixel_m))
+        for number, place in enumerate(places, start=1):
             around, margin = place.grown(reach_m)
             shown = picture.read_on(around, picture.colours, mean=pixel_m > MEAN_FROM * picture.ground_pixel_m(whole))
             seen = layer.read_on(around, (reflectivity, height), mean=pixel_m > MEAN_FROM * whole.pixel_m)
             inside = slice(margin, -margin or None)
             if min(np.isfinite(one[0, inside, inside]).mean() for one in (seen, shown)) >= COVERED_LEAST:
                 tiles.append(_registered(place, seen, shown, reach_m))
+            progress(number, len(places))
         crs, version = layer.crs, layer.tag(MAP_VERSION)
     if not tiles:
         raise InputError(f"{image} and {ortho} have no tile of {TILE_M:g} m that both cover to {COVERED_LEAST:.0%}")

@@ -1,9 +1,10 @@
 """The campus solved from points only: no simulated detections, landmarks as perception finds them, against truth."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -131,6 +132,16 @@ def of_sights(bench: Workbench, *, kind: str, value: Callable[[SightErrors], flo
     return Measurement(value=measured, command=f"figures.lidar_points.sights_of  # {kind}")
 
 
+def _further(
+    of_what: str, rows: Sequence[tuple[str, str, Callable[[Any], float]]], measure: Callable[..., Measurement]
+) -> tuple[Figure, ...]:
+    """Numbers reported beside those of the map."""
+    return tuple(
+        Figure(name=f"the same, {of_what}, {text}", unit=unit, target=None, measure=partial(measure, value=value))
+        for text, unit, value in rows
+    )
+
+
 def _sights(kind: str) -> tuple[Figure, ...]:
     rows: tuple[tuple[str, str, Callable[[SightErrors], float]], ...] = (
         ("NEES per degree of freedom", "1", lambda sights: sights.nees_per_dof),
@@ -138,15 +149,7 @@ def _sights(kind: str) -> tuple[Figure, ...]:
         ("too far by, mean", "m", lambda sights: float(sights.too_far_m.mean())),
         ("correlation of that 4 s apart", "1", lambda sights: sights.lasting),
     )
-    return tuple(
-        Figure(
-            name=f"the same, sights of a {kind}, {text}",
-            unit=unit,
-            target=None,
-            measure=partial(of_sights, kind=kind, value=value),
-        )
-        for text, unit, value in rows
-    )
+    return _further(f"sights of a {kind}", rows, partial(of_sights, kind=kind))
 
 
 def _figures(name: str, measure: Callable[..., Measurement], *, target: Bounds | None) -> tuple[Figure, ...]:
@@ -173,15 +176,7 @@ def _variant(variant: str) -> tuple[Figure, ...]:
         ("common shift removed, mean", "m", lambda errors: errors.error_without_shift_m.mean),
         ("NEES per degree of freedom, joint over landmarks", "1", lambda errors: errors.joint_nees_per_dof),
     )
-    return tuple(
-        Figure(
-            name=f"the same, {variant}, {text}",
-            unit=unit,
-            target=None,
-            measure=partial(of_variant, variant=variant, value=value),
-        )
-        for text, unit, value in rows
-    )
+    return _further(variant, rows, partial(of_variant, variant=variant))
 
 
 FIGURES = (

@@ -4,7 +4,6 @@ from collections.abc import Collection, Iterator
 
 from trigpoint.events.envelope import Envelope
 from trigpoint.events.observed import Observed
-from trigpoint.events.scanned import PointsScanned
 from trigpoint_perception.core.drive_following import DriveFollower, Told
 from trigpoint_perception.settings import PerceptionSettings
 
@@ -22,12 +21,15 @@ class FleetFollower:
         self._ended = set(ended)
         self._boots: dict[str, dict[str, DriveFollower]] = {}
         self._of_ended = 0  # sweeps perceived
-        self.passed_over = 0  # sweeps of drives that had ended
 
     @property
     def perceived(self) -> int:
         """Sweeps perceived so far."""
         return self._of_ended + sum(follower.perceived for boots in self._boots.values() for follower in boots.values())
+
+    def has_ended(self, name: DriveName) -> bool:
+        """Whether a drive's events are not followed any more."""
+        return name in self._ended
 
     def waiting(self) -> Iterator[DriveName]:
         """The drives with sweeps that wait for later events."""
@@ -38,7 +40,6 @@ class FleetFollower:
         """What is certain now that one more event is here, by drive."""
         vehicle, boot_id = name = row.identity.source, row.identity.boot_id
         if name in self._ended:
-            self.passed_over += isinstance(row.event, PointsScanned)
             return
         boots = self._boots.setdefault(vehicle, {})
         if boot_id not in boots:

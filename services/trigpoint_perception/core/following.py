@@ -15,11 +15,11 @@ from trigpoint_perception.core.odometry import (
     LidarOdometry,
     Match,
     expected_motion,
-    planar_pose,
     relative_pose,
     velocity_of,
 )
 from trigpoint_perception.core.perceiving import sights_of
+from trigpoint_perception.core.planar import planar_pose
 from trigpoint_perception.core.sweep import Sweep, usable_sweep
 from trigpoint_perception.core.tracks import Sight, Track, Tracks, class_of, followed
 from trigpoint_perception.settings import PerceptionSettings

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from trigpoint.compiled import compiled
 from trigpoint_perception.core.kept_map import NEIGHBOURS, KeptMap
+from trigpoint_perception.core.planar import by_parent, in_parent_axes, planar_pose
 from trigpoint_perception.settings import OdometrySettings
 
 Floats = NDArray[np.float64]
@@ -129,21 +130,10 @@ def relative_pose(before: Match, after: Match, settings: OdometrySettings) -> tu
     Both places are uncertain against the map; what the map's own drift and the level frame leave out is a floor and a
     share of the distance.
     """
-    relative = np.linalg.inv(before.T_odom_base) @ after.T_odom_base
-    heading_rad = float(np.arctan2(relative[1, 0], relative[0, 0]))
-    motion = np.array([relative[0, 3], relative[1, 3], heading_rad])
-    turned = np.eye(3)
-    turned[:2, :2] = [[np.cos(heading_rad), -np.sin(heading_rad)], [np.sin(heading_rad), np.cos(heading_rad)]]
-    run_m = float(np.hypot(motion[0], motion[1]))
-    across_m = settings.floor_sigma_m + settings.share_of_distance * run_m
+    motion = planar_pose(np.linalg.inv(before.T_odom_base) @ after.T_odom_base)
+    across_m = settings.floor_sigma_m + settings.share_of_distance * float(np.hypot(motion[0], motion[1]))
     floor = np.diag([across_m**2, across_m**2, settings.floor_sigma_rad**2])
-    carried = _carried(motion) @ before.covariance @ _carried(motion).T
-    return motion, turned @ after.covariance @ turned.T + carried + floor
-
-
-def _carried(motion: Floats) -> Floats:
-    """How an error of the earlier pose moves the later one as seen from it (3, 3)."""
-    return np.array([[1.0, 0.0, -motion[1]], [0.0, 1.0, motion[0]], [0.0, 0.0, 1.0]])
+    return motion, in_parent_axes(after.covariance, float(motion[2])) + by_parent(before.covariance, motion) + floor
 
 
 def expected_motion(velocity: Floats, dt_s: float) -> Floats:
@@ -157,8 +147,3 @@ def expected_motion(velocity: Floats, dt_s: float) -> Floats:
 def velocity_of(motion: Floats, dt_s: float) -> Floats:
     """The velocity (6,) whose motion over `dt_s` this is."""
     return np.concatenate([Rotation.from_matrix(motion[:3, :3]).as_rotvec(), motion[:3, 3]]) / dt_s
-
-
-def planar_pose(T_odom_base: Floats) -> Floats:
-    """x, y in m and heading in rad (3,) of a pose (4, 4)."""
-    return np.array([T_odom_base[0, 3], T_odom_base[1, 3], np.arctan2(T_odom_base[1, 0], T_odom_base[0, 0])])

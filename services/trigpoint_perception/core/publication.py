@@ -35,10 +35,9 @@ def reason_of(refusal: str) -> str:
 
 @dataclass(slots=True)
 class Said:
-    """What of a drive was told: events, sweeps, motions, landmarks' sights, sweeps refused by reason, and the things
+    """What of a drive was told: sweeps, motions, landmarks' sights, sweeps refused by reason, and the things
     themselves, by sensor, kind and track."""
 
-    count: int = 0
     sweeps: int = 0
     motions: int = 0
     sights: int = 0
@@ -47,7 +46,6 @@ class Said:
 
     def add(self, event: SweepPerceived) -> None:
         """Take one more event into account."""
-        self.count += 1
         if isinstance(event, OdometryMatched):
             self.motions += 1
         if isinstance(event, LandmarksPerceived):

@@ -47,7 +47,12 @@ def logged_frame(log: EventLog) -> MapFrame:
 
 def vehicle_streams(log: EventLog) -> tuple[str, ...]:
     """The streams of vehicles' observations, sorted."""
-    return tuple(stream for stream in log.streams() if stream.startswith(VEHICLE_PREFIX))
+    return tuple(filter(is_vehicle_stream, log.streams()))
+
+
+def is_vehicle_stream(stream: str) -> bool:
+    """Whether a stream is of a vehicle's observations."""
+    return stream.startswith(VEHICLE_PREFIX)
 
 
 def drives_of_vehicle(log: EventLog, vehicle: str) -> tuple[Drive, ...]:

@@ -233,8 +233,9 @@ def test_several_logs_are_replayed_and_one_that_cannot_be_read_costs_no_other(
 def test_a_log_is_replayed_by_a_worker_elsewhere(campus: BuiltCampus, tmp_path: Path) -> None:
     with running_workers(tmp_path, 1) as address:
         said = trigpoint("replay", "--data", campus.data, "--cluster", address, "--json")
-    assert (said.status, said.answer["differences"]) == (0, 0)
-    assert [one["data"] for one in said.answer["data"]] == [str(campus.data)]
+    here = trigpoint("replay", "--data", campus.data, "--json")
+    assert said.status == 0
+    assert {**said.answer, "wall_s": 0.0} == {**here.answer, "wall_s": 0.0}
 
 
 def test_one_database_is_not_held_against_two_logs(campus: BuiltCampus, tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from viewed_maps.browser import Viewed, chromium, missing, viewed
+from viewed_maps.browser import Viewed, chromium, viewed
 from viewed_maps.labelling import (
     beside_a_suggestion,
     placed_by_keyboard,
@@ -16,12 +16,6 @@ from viewed_maps.labelling import (
 from viewed_maps.solving import solved_campus, solving
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
-
-
-@pytest.fixture(scope="module")
-def viewer_built() -> None:
-    if missing():
-        pytest.skip(missing())
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ from trigpoint.landmarks.model import MapChange
 from trigpoint.logs.mcap_log import McapLog
 from trigpoint_landmarks.http.tokens import Scope, issue_token
 from trigpoint_optimisation.settings import SolveSettings, settings_json
-from viewed_maps.browser import Viewed, chromium, missing, viewed
+from viewed_maps.browser import Viewed, chromium, viewed
 
 pytestmark = pytest.mark.browser
 
@@ -37,12 +37,6 @@ class Labelled:
 def solved(change: MapChange) -> MapChange:
     """The same, with how it was solved: that says how labels find their landmarks."""
     return replace(change, version=replace(change.version, settings_json=settings_json(SolveSettings())))
-
-
-@pytest.fixture(scope="module")
-def viewer_built() -> None:
-    if missing():
-        pytest.skip(missing())
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from raster_readers.in_files import (
 from raster_readers.in_maplibre import MapPage, map_page
 from raster_readers.in_qgis import cog_in_qgis, pictures_in_qgis
 from raster_readers.marks import MarkedLayer, marked_layer
-from viewed_maps.browser import chromium, missing
+from viewed_maps.browser import chromium
 
 HALF_PX = 0.5
 
@@ -25,9 +25,7 @@ def layer(tmp_path_factory: pytest.TempPathFactory) -> MarkedLayer:
 
 
 @pytest.fixture(scope="module")
-def page(layer: MarkedLayer) -> Iterator[MapPage]:
-    if missing():
-        pytest.skip(missing())
+def page(layer: MarkedLayer, viewer_built: None) -> Iterator[MapPage]:
     with chromium() as browser, map_page(browser, layer) as found:
         yield found
 

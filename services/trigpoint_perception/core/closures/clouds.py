@@ -8,6 +8,7 @@ import small_gicp
 from numpy.typing import NDArray
 
 from trigpoint.errors import EventRejected
+from trigpoint.geodesy.poses import Pose2
 from trigpoint_perception.core.closures.runs import Run
 from trigpoint_perception.core.closures.settings import VerificationSettings
 from trigpoint_perception.core.deskew import deskewed, planar_path
@@ -15,6 +16,7 @@ from trigpoint_perception.core.following import NumberedSweep
 from trigpoint_perception.core.ground import heights_above_ground
 from trigpoint_perception.core.kept_map import NEIGHBOURS
 from trigpoint_perception.core.odometry import LidarOdometry, Match
+from trigpoint_perception.core.planar import spatial_pose
 from trigpoint_perception.core.sweep import Sweep, usable_sweep
 from trigpoint_perception.settings import PerceptionSettings
 
@@ -104,10 +106,5 @@ def _merged(
 
 def _moved(before: Floats, after: Floats) -> Floats:
     """The motion (4, 4) from one planar pose (3,) to another."""
-    c, s = np.cos(before[2]), np.sin(before[2])
-    step_m = after[:2] - before[:2]
-    turned_rad = after[2] - before[2]
-    motion = np.eye(4)
-    motion[:2, :2] = [[np.cos(turned_rad), -np.sin(turned_rad)], [np.sin(turned_rad), np.cos(turned_rad)]]
-    motion[:2, 3] = [c * step_m[0] + s * step_m[1], c * step_m[1] - s * step_m[0]]
-    return motion
+    motion = Pose2(*before).inverse().compose(Pose2(*after))
+    return spatial_pose(np.array([motion.x_m, motion.y_m, motion.heading_rad]))

@@ -10,7 +10,8 @@ from scipy.spatial import cKDTree
 from trigpoint.geodesy.poses import wrap_angle_rad
 from trigpoint_perception.core.closures.clouds import Cloud
 from trigpoint_perception.core.closures.settings import VerificationSettings
-from trigpoint_perception.core.odometry import ROTATION_STEP_RAD, planar_covariance, planar_pose
+from trigpoint_perception.core.odometry import ROTATION_STEP_RAD, planar_covariance
+from trigpoint_perception.core.planar import by_parent, in_parent_axes, planar_pose, spatial_pose
 
 Floats = NDArray[np.float64]
 
@@ -35,7 +36,7 @@ def verified(one: Cloud, other: Cloud, expected: Floats, settings: VerificationS
         other.points,
         one.points,
         other.tree,
-        init_T_target_source=_spatial(expected),
+        init_T_target_source=spatial_pose(expected),
         registration_type="GICP",
         max_correspondence_distance=settings.reach_m,
         num_threads=1,
@@ -49,7 +50,9 @@ def verified(one: Cloud, other: Cloud, expected: Floats, settings: VerificationS
     pose = planar_pose(T_other_one)
     return Verification(
         T_other_one=pose,
-        covariance=_seen_from_other(own + one.covariance, float(pose[2])) + _carried(pose, other) + _floor(settings),
+        covariance=in_parent_axes(own + one.covariance, float(pose[2]))
+        + by_parent(other.covariance, pose)
+        + _floor(settings),
         matched_share=share,
         refusal=_refusal(pose - expected, own, share, settings),
     )
@@ -73,29 +76,6 @@ def _refusal(off: Floats, covariance: Floats, share: float, settings: Verificati
     if not loosest_m <= settings.sigma_max_m:
         return "points leave a direction loose"
     return ""
-
-
-def _spatial(pose: Floats) -> Floats:
-    """A planar pose (3,) as (4, 4)."""
-    spatial = np.eye(4)
-    spatial[:2, :2] = [[np.cos(pose[2]), -np.sin(pose[2])], [np.sin(pose[2]), np.cos(pose[2])]]
-    spatial[:2, 3] = pose[:2]
-    return spatial
-
-
-def _seen_from_other(covariance: Floats, heading_rad: float) -> Floats:
-    """A covariance (3, 3) of x, y in the one's own axes, in the other's."""
-    turned = np.eye(3)
-    turned[:2, :2] = [[np.cos(heading_rad), -np.sin(heading_rad)], [np.sin(heading_rad), np.cos(heading_rad)]]
-    seen: Floats = turned @ covariance @ turned.T
-    return seen
-
-
-def _carried(pose: Floats, other: Cloud) -> Floats:
-    """How an error of the other's place in its cloud moves the one as seen from it (3, 3)."""
-    moved = np.array([[1.0, 0.0, -pose[1]], [0.0, 1.0, pose[0]], [0.0, 0.0, 1.0]])
-    carried: Floats = moved @ other.covariance @ moved.T
-    return carried
 
 
 def _floor(settings: VerificationSettings) -> Floats:
