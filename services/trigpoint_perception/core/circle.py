@@ -1,6 +1,5 @@
-"""A circle fitted to an arc that was seen from one side, with an honest covariance."""
+"""Circles fitted to arcs that were seen from one side, with honest covariances."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +8,10 @@ from numpy.typing import NDArray
 from trigpoint.compiled import compiled
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
-ITERATIONS = 8
+ITERATIONS_MAX = 8
+STEP_M = 1e-5  # a step as short is the last
 RADIUS_MIN_M = 0.02
 MEAN_DEPTH = 0.785  # of a cylinder's visible points before its axis, radii
 DIVERGENCE_RAD = 0.003  # full width of a usual sensor's beam
@@ -19,44 +20,66 @@ SHARED_POINTS = 9.0  # neighbours' errors go together (a surface's reflectivity 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Arc:
-    """Points (n, 2) of an upright cylinder seen from `viewpoint_m` (2,), and the angles (k,) its k segments span there,
-    neighbouring beams `step_rad` apart."""
+class Arcs:
+    """Points of upright cylinders (k,) seen from `viewpoint_m` (2,), and the angles their segments span there.
+
+    Cylinder i has the points point_m[point_begin[i] : point_begin[i + 1]], (n, 2), and the angles of
+    width_rad[width_begin[i] : width_begin[i + 1]]; neighbouring beams are `step_rad` apart.
+    """
 
     point_m: Floats
-    viewpoint_m: Floats
+    point_begin: Ints
     width_rad: Floats
+    width_begin: Ints
+    viewpoint_m: Floats
     step_rad: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Circle:
-    """A circle with the covariance (2, 2) of its centre in m^2; `residual_m` the points' root mean square distance."""
+class Circles:
+    """Circles (k,): centres (k, 2) with covariances (k, 2, 2) in m^2, radii with their 1-sigma; `residual_m` the
+    points' root mean square distances."""
 
     centre_m: Floats
-    radius_m: float
     covariance_m2: Floats
-    radius_sigma_m: float
-    residual_m: float
+    radius_m: Floats
+    radius_sigma_m: Floats
+    residual_m: Floats
 
 
-def fitted_circle(arc: Arc, *, range_sigma_m: float, radius_max_m: float) -> Circle:
-    """The circle nearest to the points, its radius held by the widths the object covered.
+def fitted_circles(arcs: Arcs, *, range_sigma_m: float, radius_max_m: float) -> Circles:
+    """The circles nearest to the points, their radii held by the widths the objects covered.
 
     Gauss-Newton on geometric distances (Huber's weights) with the angular width as a measurement of the radius: from
     one side alone the points hardly tell a large circle from a near one, and the covariance says so. Its scale is the
     larger of the sensor's noise and the residuals found. Neighbours' errors are taken as shared, the width's are its
     own; noise is along the rays, so that the middle between the edges tells the direction best.
     """
-    fitted = _fitted(arc.point_m, arc.viewpoint_m, arc.width_rad, np.array([arc.step_rad, range_sigma_m, radius_max_m]))
-    state, covariance, residual_m = fitted
-    return Circle(
-        centre_m=state[:2],
-        radius_m=float(state[2]),
-        covariance_m2=covariance[:2, :2],
-        radius_sigma_m=math.sqrt(covariance[2, 2]),
+    limits = np.array([arcs.step_rad, range_sigma_m, radius_max_m])
+    state, covariance, residual_m = _all_fitted(
+        arcs.point_m, arcs.point_begin, arcs.width_rad, arcs.width_begin, arcs.viewpoint_m, limits
+    )
+    return Circles(
+        centre_m=state[:, :2],
+        covariance_m2=covariance[:, :2, :2],
+        radius_m=state[:, 2],
+        radius_sigma_m=np.sqrt(covariance[:, 2, 2]),
         residual_m=residual_m,
     )
+
+
+@compiled
+def _all_fitted(
+    point_m: Floats, point_begin: Ints, width_rad: Floats, width_begin: Ints, viewpoint_m: Floats, limits: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """`_fitted` of each arc: states (k, 3), covariances (k, 3, 3), residuals (k,)."""
+    count = len(point_begin) - 1
+    state, covariance, residual_m = np.empty((count, 3)), np.empty((count, 3, 3)), np.empty(count)
+    for arc in range(count):
+        points = point_m[point_begin[arc] : point_begin[arc + 1]]
+        widths = width_rad[width_begin[arc] : width_begin[arc + 1]]
+        state[arc], covariance[arc], residual_m[arc] = _fitted(points, viewpoint_m, widths, limits)
+    return state, covariance, residual_m
 
 
 @compiled
@@ -75,7 +98,7 @@ def _fitted(point_m: Floats, viewpoint_m: Floats, width_rad: Floats, limits: Flo
     state[2] = prior_m
     information = np.eye(3)
     shared = min(SHARED_POINTS, len(point_m))
-    for _ in range(ITERATIONS):
+    for _ in range(ITERATIONS_MAX):
         information, gradient = _normal_equations(point_m, state, sigma_m)
         information, gradient = information / shared, gradient / shared
         information[2, 2] += 1.0 / prior_sigma_m**2
@@ -83,14 +106,23 @@ def _fitted(point_m: Floats, viewpoint_m: Floats, width_rad: Floats, limits: Flo
         _add_direction(information, gradient, left / across_sigma_m, state[:2] - viewpoint_m)
         information[0, 0] += 1e-6 / prior_sigma_m**2  # solvable where all points lie in one direction
         information[1, 1] += 1e-6 / prior_sigma_m**2
-        state = state - np.linalg.solve(information, gradient)
+        before = state
+        state = before - np.linalg.solve(information, gradient)
         state[2] = min(max(state[2], RADIUS_MIN_M), radius_max_m)
+        if np.abs(state - before).max() < STEP_M:
+            break
     away = np.sqrt((point_m[:, 0] - state[0]) ** 2 + (point_m[:, 1] - state[1]) ** 2) - state[2]
     residual_m = np.sqrt((away**2).mean())
-    covariance = np.linalg.inv(information) * max(1.0, (residual_m / sigma_m) ** 2)
+    return state, _covariance(information, residual_m / sigma_m), residual_m
+
+
+@compiled
+def _covariance(information: Floats, scale: float) -> Floats:
+    """Of centre and radius (3, 3); wider by the residuals over the sensor's sigma where those are larger."""
+    covariance = np.linalg.inv(information) * max(1.0, scale**2)
     for axis in range(3):
         covariance[axis, axis] += SYSTEMATIC_SIGMA_M**2
-    return state, covariance, residual_m
+    return covariance
 
 
 @compiled
@@ -131,7 +163,7 @@ def _normal_equations(point_m: Floats, state: Floats, sigma_m: float) -> tuple[F
     information, gradient, derivative = np.zeros((3, 3)), np.zeros(3), np.empty(3)
     for row in range(len(point_m)):
         x, y = point_m[row, 0] - state[0], point_m[row, 1] - state[1]
-        distance = max(np.hypot(x, y), 1e-9)
+        distance = max(np.sqrt(x * x + y * y), 1e-9)
         residual = distance - state[2]
         weight = 1.0 / (sigma_m**2 * max(1.0, abs(residual) / (2.0 * sigma_m)))
         derivative[0], derivative[1], derivative[2] = -x / distance, -y / distance, -1.0

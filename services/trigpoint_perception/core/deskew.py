@@ -8,12 +8,14 @@ from scipy.spatial.transform import Rotation
 
 from trigpoint.compiled import compiled
 from trigpoint.errors import EventRejected
+from trigpoint_perception.core.velocity import motions
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 SLOT_NS = 500_000  # points of so short a time share one pose: within 5 mm at 20 m/s
 REACH_NS = 150_000_000  # beyond a path's ends its motion is taken to go on: one sweep
+HELD_NS = 250_000_000  # about a sweep's stamp: so long a velocity is taken to hold
 NS_PER_S = 1e9
 
 
@@ -64,15 +66,33 @@ def deskewed(point_m: Floats, offset_ns: Ints, *, stamp_ns: int, path: Path) -> 
 
     Raises EventRejected "no path" where the path does not cover the sweep.
     """
+    slot, middle_ns = _slots(offset_ns)
+    position_m, rotation = poses_at(path, np.append(stamp_ns + middle_ns, np.int64(stamp_ns)))
+    to_stamp = rotation[-1].T
+    moved_m = (position_m[:-1] - position_m[-1]) @ to_stamp.T
+    return _moved(point_m, slot, moved_m, to_stamp @ rotation[:-1])
+
+
+def deskewed_by_velocity(point_m: Floats, offset_ns: Ints, velocity: Floats) -> Floats:
+    """As `deskewed`, of a base whose velocity (6,) was the same all the while.
+
+    Raises EventRejected "no path" where points are farther from the stamp than HELD_NS.
+    """
+    slot, middle_ns = _slots(offset_ns)
+    farthest_ns = int(np.abs(middle_ns).max())
+    if farthest_ns > HELD_NS:
+        raise EventRejected("no path", f"points up to {farthest_ns} ns from the stamp, at most {HELD_NS} ns are")
+    return _moved(point_m, slot, *motions(velocity, middle_ns / NS_PER_S))
+
+
+def _slots(offset_ns: Ints) -> tuple[Ints, Ints]:
+    """The short time (n,) each point falls into, and those times' middles (m,) as offsets."""
     first_ns, last_ns = int(offset_ns.min()), int(offset_ns.max())
     slots = (last_ns - first_ns) // SLOT_NS + 1
     middle_ns = first_ns + SLOT_NS * np.arange(slots, dtype=np.int64) + SLOT_NS // 2
     if slots == 1:
         middle_ns = np.array([(first_ns + last_ns) // 2], dtype=np.int64)
-    position_m, rotation = poses_at(path, np.append(stamp_ns + middle_ns, np.int64(stamp_ns)))
-    to_stamp = rotation[-1].T
-    moved_m = (position_m[:-1] - position_m[-1]) @ to_stamp.T
-    return _moved(point_m, (offset_ns - first_ns) // SLOT_NS, moved_m, to_stamp @ rotation[:-1])
+    return (offset_ns - first_ns) // SLOT_NS, middle_ns
 
 
 @compiled

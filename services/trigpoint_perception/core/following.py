@@ -5,28 +5,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from trigpoint.errors import EventRejected
 from trigpoint.events.perceived import LandmarksPerceived, OdometryMatched, PerceivedLandmark, SweepPerceived
 from trigpoint.events.scanned import PointsScanned
-from trigpoint_perception.core.deskew import NS_PER_S, Path, deskewed, poses_at
+from trigpoint_perception.core.deskew import NS_PER_S, Path, deskewed, deskewed_by_velocity, poses_at
 from trigpoint_perception.core.odometry import (
     LidarOdometry,
     Match,
-    expected_motion,
     relative_pose,
-    velocity_of,
 )
 from trigpoint_perception.core.perceiving import sights_of
 from trigpoint_perception.core.planar import planar_pose
 from trigpoint_perception.core.sweep import Sweep, usable_sweep
 from trigpoint_perception.core.tracks import Sight, Track, Tracks, class_of, followed
+from trigpoint_perception.core.velocity import expected_motion, velocity_of
 from trigpoint_perception.settings import PerceptionSettings
 
 Floats = NDArray[np.float64]
-
-VELOCITY_SPAN_S = 0.1  # over which a velocity is written as a path
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,12 +151,12 @@ class SweepFollower:
         if not sweep.offset_ns.any():
             return sweep
         if self._wheels is not None and self._is_covered(sweep, stamp_ns):
-            path = self._wheels
+            still_m = deskewed(sweep.point_m, sweep.offset_ns, stamp_ns=stamp_ns, path=self._wheels)
         elif self._velocity is not None:
-            path = _path_of(self._velocity, stamp_ns)
+            still_m = deskewed_by_velocity(sweep.point_m, sweep.offset_ns, self._velocity)
         else:
             return sweep
-        return replace(sweep, point_m=deskewed(sweep.point_m, sweep.offset_ns, stamp_ns=stamp_ns, path=path))
+        return replace(sweep, point_m=still_m)
 
     def _is_covered(self, sweep: Sweep, stamp_ns: int) -> bool:
         wheels = self._wheels
@@ -245,14 +241,6 @@ class SweepFollower:
         stamp_ns = waiting.numbered.stamp_ns
         motion = () if waiting.odometry is None else ((stamp_ns, waiting.odometry),)
         return (*motion, (stamp_ns, perceived))
-
-
-def _path_of(velocity: Floats, stamp_ns: int) -> Path:
-    """A velocity (6,) as a path about a stamp, in the base frame there."""
-    span_ns = round(VELOCITY_SPAN_S * NS_PER_S)
-    poses = np.array([expected_motion(velocity, share * VELOCITY_SPAN_S) for share in (-1.0, 0.0, 1.0)])
-    stamps = np.array([stamp_ns - span_ns, stamp_ns, stamp_ns + span_ns], dtype=np.int64)
-    return Path(stamp_ns=stamps, position_m=poses[:, :3, 3], rotation=Rotation.from_matrix(poses[:, :3, :3]))
 
 
 def _landmark(sight: Sight, track: Track) -> PerceivedLandmark:

@@ -23,10 +23,19 @@ def heights_above_ground(sweep: Sweep, settings: GroundSettings, *, range_max_m:
     """
     bins = int(np.ceil(range_max_m / settings.bin_m)) + 1
     z_m = sweep.point_m[:, 2]
-    sector = ((sweep.azimuth_rad + np.pi) / (2.0 * np.pi) * settings.sectors).astype(np.int64) % settings.sectors
+    sector = _sectors(sweep.azimuth_rad, settings.sectors)
     lowest = _lowest(z_m, sweep.run_m, sector, (settings.sectors, bins), settings.bin_m)
     profile = _profiles(lowest, settings.bin_m, settings.slope_max, settings.step_m)
     return _heights(z_m, sweep.run_m, sector, _smoothed(profile), settings.bin_m)
+
+
+@compiled
+def _sectors(azimuth_rad: Floats, sectors: int) -> Ints:
+    """The sector (n,) each direction is in."""
+    sector = np.empty(len(azimuth_rad), np.int64)
+    for row in range(len(azimuth_rad)):
+        sector[row] = int((azimuth_rad[row] + np.pi) / (2.0 * np.pi) * sectors) % sectors
+    return sector
 
 
 @compiled

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 import small_gicp
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from trigpoint.compiled import compiled
 from trigpoint_perception.core.kept_map import NEIGHBOURS, KeptMap
@@ -134,16 +133,3 @@ def relative_pose(before: Match, after: Match, settings: OdometrySettings) -> tu
     across_m = settings.floor_sigma_m + settings.share_of_distance * float(np.hypot(motion[0], motion[1]))
     floor = np.diag([across_m**2, across_m**2, settings.floor_sigma_rad**2])
     return motion, in_parent_axes(after.covariance, float(motion[2])) + by_parent(before.covariance, motion) + floor
-
-
-def expected_motion(velocity: Floats, dt_s: float) -> Floats:
-    """The motion (4, 4) of a velocity (6,), rotation vector in rad/s first, then m/s, held for so long."""
-    motion = np.eye(4)
-    motion[:3, :3] = Rotation.from_rotvec(velocity[:3] * dt_s).as_matrix()
-    motion[:3, 3] = velocity[3:] * dt_s
-    return motion
-
-
-def velocity_of(motion: Floats, dt_s: float) -> Floats:
-    """The velocity (6,) whose motion over `dt_s` this is."""
-    return np.concatenate([Rotation.from_matrix(motion[:3, :3]).as_rotvec(), motion[:3, 3]]) / dt_s

@@ -168,7 +168,8 @@ def _pieces(seen: Floats, step_rad: float, limits: Floats) -> tuple[Floats, Floa
 
 @compiled
 def _are_chained(before: Floats, here: Floats, step_rad: float, gap_m: float) -> bool:
-    apart = np.hypot(here[0] - before[0], here[1] - before[1])
+    x, y = here[0] - before[0], here[1] - before[1]
+    apart = np.sqrt(x * x + y * y)
     return bool(here[3] == before[3] and apart <= gap_m + 3.0 * step_rad * before[4])
 
 
