@@ -119,9 +119,8 @@ def _fitted(point_m: Floats, viewpoint_m: Floats, width_rad: Floats, limits: Flo
 @compiled
 def _covariance(information: Floats, scale: float) -> Floats:
     """Of centre and radius (3, 3); wider by the residuals over the sensor's sigma where those are larger."""
-    covariance: Floats = np.linalg.inv(information) * max(1.0, scale**2)
-    for axis in range(3):
-        covariance[axis, axis] += SYSTEMATIC_SIGMA_M**2
+    covariance = SYSTEMATIC_SIGMA_M**2 * np.eye(3)
+    covariance += np.linalg.inv(information) * max(1.0, scale**2)
     return covariance
 
 
