@@ -69,8 +69,7 @@ GROUPS: Mapping[str, Sequence[Figure]] = {
     "viewer": viewer.FIGURES,
     "ortho": (*ortho.FIGURES, *ortho_aerial.FIGURES, *ortho_anew.FIGURES, *raster_readers.FIGURES),
     "relocalise": relocalise.FIGURES,
-    "scale": scale.FIGURES,
-    "billion": billion.FIGURES,
+    "scale": (*scale.FIGURES, *billion.FIGURES),
     "security": (*security.FIGURES, *security_fuzz.FIGURES),
 }
 PROGRAM = (str(Path(sys.executable).with_name("trigpoint")),)
