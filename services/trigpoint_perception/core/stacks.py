@@ -57,9 +57,9 @@ def upright_stacks(
     thin = _thin_segments(segments, settings, clearance_m)
     centre_m = _segment_centres(segments, thin, sensor_m)
     linked = _linked_stacks(centre_m, settings)
+    tall = _reach(segments.mean_height_m[thin[linked.segment]], linked, settings)
+    linked = linked.chosen(tall[linked.label])
     stacks = Stacks(thin[linked.segment], linked.begin)
-    tall = _reach(segments.mean_height_m[stacks.segment], stacks, settings)
-    linked, stacks = linked.chosen(tall[linked.label]), stacks.chosen(tall[linked.label])
     ring, height_m = segments.ring[stacks.segment], segments.mean_height_m[stacks.segment]
     axes = _Axes(*_fitted_axes(centre_m[linked.segment], ring, height_m, stacks.begin))
     upright = _are_upright(axes, stacks, segments, settings)
