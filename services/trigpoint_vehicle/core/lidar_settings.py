@@ -96,7 +96,7 @@ class LidarSettings:
     range_min_m: float = 0.9
     range_max_m: float = 100.0
     range_sigma_m: float = 0.025
-    beam_divergence_rad: float = 0.003  # full width, level (Velodyne VLS-128 manual, table F-1: 3.0 mrad)
+    beam_divergence_rad: float = 0.003  # full width, level (Velodyne VLS-128 manual, table F-1; the same make)
     return_limit: float = 0.1
     return_scatter: float = 0.3  # 1-sigma of the return's natural logarithm
     intensity_scatter: float = 0.08  # 1-sigma, as a share

@@ -30,6 +30,7 @@ GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 FIRST_MIX, SECOND_MIX = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 DRAWS_A_RAY, LEAF_DRAW = 8, 7
 NO_SOLID = -1
+WHOLE = 1.0 - 1e-9  # share of a beam: all of it
 
 
 class Optics(NamedTuple):
@@ -72,8 +73,8 @@ class Taken(NamedTuple):
 
 
 class _Nearest(NamedTuple):
-    # of each beam so far the nearest that stops it (s, 0), and the nearest that stops a part of it (s, 1): range in m,
-    # cosine of incidence summed over that part, its share, solid
+    # of each beam so far the nearest that stops all of it (s, 0) and the nearest that stops a part (s, 1; further parts
+    # are left out): range in m, cosine of incidence summed over the part, the part's share, solid
     range_m: Floats
     cosine: Floats
     share: Floats
@@ -229,7 +230,7 @@ def _look(view: _View, number: int, columns: tuple[int, int], nearest: _Nearest)
                 hit = crown_hit(ray, at, size, chance)
             else:
                 hit = _hit(solids, number, ray, at, facing, optics.divergence_rad)
-            part = 1 if hit[2] < 1.0 else 0
+            part = 0 if hit[2] >= WHOLE else 1
             if hit[0] < nearest.range_m[shot, part]:
                 nearest.range_m[shot, part], nearest.cosine[shot, part] = hit[0], hit[1]
                 nearest.share[shot, part], nearest.solid[shot, part] = hit[2], number
