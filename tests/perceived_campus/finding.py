@@ -19,6 +19,7 @@ from trigpoint_vehicle.core.campus_settings import CampusSettings, RouteSettings
 from trigpoint_vehicle.core.lidar.scanned_campus import ScannedCampus, scanned_campus
 from trigpoint_vehicle.core.lidar.scans import SWEEPS_AT_ONCE, DriveScans
 from trigpoint_vehicle.core.lidar_settings import CarriedLidar
+from trigpoint_vehicle.core.scene.world import Scene
 from vehicle_lidar.worlds import Seen, seen_in
 
 Floats = NDArray[np.float64]
@@ -49,15 +50,32 @@ class Found:
         return self.recalled / self.seen if self.seen else float("nan")
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Driven:
+    """A straight street driven once: `told` of each sweep, and where the base truly was (x, y in m over the ground from
+    the campus's corner, heading in rad)."""
+
+    scanned: ScannedCampus
+    told: list[tuple[LandmarksPerceived, Floats]]
+
+
 @cache
-def found_along(*, length_m: float, seed: int) -> dict[str, Found]:
-    """What is found along a straight street driven once, by kind, "pole" (trunks and signs too) and "corner"."""
+def driven_along(*, length_m: float, seed: int) -> Driven:
+    """A straight street of a campus, perceived from points alone."""
     plan = CampusSettings(vehicles=1, route=RouteSettings(straight_length_m=length_m))
     settings = with_plan(plan, "straight")
     scanned = scanned_campus(simulate_campus(seed, settings), settings, CarriedLidar(), seed=seed)
-    places, (seen_poles, seen_corners) = things_of(scanned), seen_on(scanned)
+    return Driven(scanned=scanned, told=perceived(scanned, scanned.scans[0]))
+
+
+@cache
+def found_along(*, length_m: float, seed: int) -> dict[str, Found]:
+    """What is found along a straight street driven once, by kind, "pole" (trunks and signs too) and "corner"."""
+    drive = driven_along(length_m=length_m, seed=seed)
+    scanned, places = drive.scanned, things_of(drive.told)
+    seen_poles, seen_corners = seen_on(scanned)
     scene, scale = scanned.scene, scanned.scene.scale
-    pole_m = np.vstack([scene.poles.place_m, scene.trees.place_m]) / scale
+    pole_m = poles_of(scene).place_m
     corner_m = scene.buildings.corner_m.reshape(-1, 2) / scale
     return {
         POLE: _held(places[POLE], pole_m, seen_poles),
@@ -76,12 +94,27 @@ def _held(found_m: Floats, true_m: Floats, seen: NDArray[np.bool_]) -> Found:
     )
 
 
-def things_of(scanned: ScannedCampus) -> dict[str, Floats]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Poles:
+    """All poles and trunks: their axes (n, 2) in m over the ground from the campus's corner, and radii (n,) in m."""
+
+    place_m: Floats
+    radius_m: Floats
+
+
+def poles_of(scene: Scene) -> Poles:
+    """The poles of a scene, then its trees' trunks."""
+    return Poles(
+        place_m=np.vstack([scene.poles.place_m, scene.trees.place_m]) / scene.scale,
+        radius_m=np.concatenate([scene.poles.radius_m, scene.trees.trunk_radius_m]),
+    )
+
+
+def things_of(told: list[tuple[LandmarksPerceived, Floats]]) -> dict[str, Floats]:
     """Where each thing that was tracked stands (n, 2), by kind: the median of its sights laid out by the true poses, in
     metres over the ground from the campus's corner."""
     sights: dict[tuple[str, int], list[Floats]] = {}
-    drive = scanned.scans[0]
-    for event, pose in perceived(scanned, drive):
+    for event, pose in told:
         turn = np.array([[np.cos(pose[2]), -np.sin(pose[2])], [np.sin(pose[2]), np.cos(pose[2])]])
         for one in event.landmarks:
             sights.setdefault((one.kind, one.track), []).append(pose[:2] + turn @ np.array([one.x_m, one.y_m]))

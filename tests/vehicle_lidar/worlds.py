@@ -15,7 +15,9 @@ from trigpoint_vehicle.core.lidar_settings import CarriedLidar, LidarSettings
 
 Floats = NDArray[np.float64]
 SEED = 5
-EXACT = LidarSettings(range_sigma_m=0.0, return_scatter=0.0, intensity_scatter=0.0, dropout=0.0)
+EXACT = LidarSettings(
+    range_sigma_m=0.0, return_scatter=0.0, intensity_scatter=0.0, dropout=0.0, beam_divergence_rad=0.0
+)
 
 
 @cache

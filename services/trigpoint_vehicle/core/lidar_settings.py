@@ -80,7 +80,8 @@ class LidarSettings:
     """A lidar with 16 beams on the roof (Velodyne VLP-16 manual, 63-9243), its place in the base frame.
 
     `return_limit` is the least return: reflectivity x cosine of incidence x share of the beam that is filled, over the
-    square of the range in units of `range_max_m`; so a dark wall is seen to the range limit, asphalt to some 30 m.
+    square of the range in units of `range_max_m`; so a dark wall is seen to the range limit, asphalt to some 30 m. Of
+    what a beam lies on it says the strongest return.
     """
 
     name: str = "lidar"
@@ -95,7 +96,7 @@ class LidarSettings:
     range_min_m: float = 0.9
     range_max_m: float = 100.0
     range_sigma_m: float = 0.025
-    beam_divergence_rad: float = 0.003
+    beam_divergence_rad: float = 0.003  # full width, level (Velodyne VLS-128 manual, table F-1; the same make)
     return_limit: float = 0.1
     return_scatter: float = 0.3  # 1-sigma of the return's natural logarithm
     intensity_scatter: float = 0.08  # 1-sigma, as a share

@@ -11,10 +11,9 @@ from trigpoint.events.scanned import PointsScanned
 from trigpoint_vehicle.core.lidar.casting import uniform
 from trigpoint_vehicle.core.lidar.scanned_campus import ScannedCampus
 from trigpoint_vehicle.core.lidar.solids import BOX, CROWN, CYLINDER
-from trigpoint_vehicle.core.lidar_settings import LidarSettings
 from trigpoint_vehicle.core.scene.ground import ground_materials, surface_heights_m
 from trigpoint_vehicle.core.scene.materials import Material
-from vehicle_lidar.worlds import Seen, scanned, seen_in
+from vehicle_lidar.worlds import EXACT, Seen, scanned, seen_in
 
 Floats = NDArray[np.float64]
 
@@ -126,7 +125,7 @@ def test_no_ray_passes_through_a_wall(exact: ScannedCampus, seen: Seen) -> None:
 
 
 def test_ranges_err_by_their_noise(exact: ScannedCampus) -> None:
-    noisy_sensor = LidarSettings(return_scatter=0.0, intensity_scatter=0.0, dropout=0.0)
+    noisy_sensor = replace(EXACT, range_sigma_m=0.025)
     noisy = replace(exact.scans[0], settings=noisy_sensor).taken(SWEEP, SWEEP + 1).range_m[0]
     true = exact.scans[0].taken(SWEEP, SWEEP + 1).range_m[0]
     error_m = (noisy - true)[np.isfinite(noisy) & np.isfinite(true)]
@@ -135,7 +134,7 @@ def test_ranges_err_by_their_noise(exact: ScannedCampus) -> None:
 
 
 def test_some_of_what_comes_back_is_dropped(exact: ScannedCampus) -> None:
-    lossy = LidarSettings(range_sigma_m=0.0, return_scatter=0.0, intensity_scatter=0.0, dropout=0.2)
+    lossy = replace(EXACT, dropout=0.2)
     there = np.isfinite(exact.scans[0].taken(SWEEP, SWEEP + 1).range_m[0])
     left = np.isfinite(replace(exact.scans[0], settings=lossy).taken(SWEEP, SWEEP + 1).range_m[0])
     assert left.sum() / there.sum() == pytest.approx(0.8, abs=0.02)  # 5 sigma of over 10,000 draws

@@ -1,4 +1,4 @@
-"""Sweeps of a lidar cast into the world: every ray's nearest hit, from the pose the sensor had at its own time."""
+"""Sweeps of a lidar cast into the world: every beam's strongest return, from the pose the sensor had at that time."""
 
 import math
 from typing import NamedTuple
@@ -30,6 +30,7 @@ GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 FIRST_MIX, SECOND_MIX = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 DRAWS_A_RAY, LEAF_DRAW = 8, 7
 NO_SOLID = -1
+WHOLE = 1.0 - 1e-9  # share of a beam: all of it
 
 
 class Optics(NamedTuple):
@@ -72,9 +73,11 @@ class Taken(NamedTuple):
 
 
 class _Nearest(NamedTuple):
-    # of each ray so far: distance, cosine of incidence, solid
+    # of each beam so far the nearest that stops all of it (s, 0) and the nearest that stops a part (s, 1; further parts
+    # are left out): range in m, cosine of incidence summed over the part, the part's share, solid
     range_m: Floats
     cosine: Floats
+    share: Floats
     solid: Ints
 
 
@@ -182,27 +185,28 @@ def _placed(solids: Solids, movers: Floats) -> _Placed:
 
 
 @compiled
-def _columns(turning: _Turning, foot: Floats, reach_m: float, range_max_m: float) -> tuple[float, float, float]:
+def _columns(view: _View, foot: Floats, reach_m: float) -> tuple[float, float, float]:
     # the azimuth a solid is seen at from the middle of the sweep, half of what it fills, and the azimuth of a column;
     # half below 0 for one out of range
+    turning, optics = view.turning, view.optics
     middle = turning.place[len(turning.place) // 2]
     away_x, away_y = foot[0] - middle[0], foot[1] - middle[1]
     distance = math.hypot(away_x, away_y)
     half = math.pi
-    if distance - reach_m > range_max_m:
+    if distance - reach_m > optics.range_max_m:
         half = -1.0
     elif distance > reach_m:
-        half = min(math.asin(reach_m / distance) + OFF_LEVEL_RAD, math.pi)
+        half = min(math.asin(reach_m / distance) + OFF_LEVEL_RAD + 0.5 * optics.divergence_rad, math.pi)
     step = (turning.azimuth[0] - turning.azimuth[-1]) / (len(turning.azimuth) - 1)
     return math.atan2(away_y, away_x), half, step
 
 
 @compiled
-def _hit(solids: Solids, number: int, ray: Ray, at: Foot, facing: tuple[float, float]) -> Hit:
+def _hit(solids: Solids, number: int, ray: Ray, at: Foot, facing: tuple[float, float], divergence_rad: float) -> Hit:
     size = (solids.size[number, 0], solids.size[number, 1], solids.size[number, 2])
     if solids.shape[number] == CYLINDER:
-        return cylinder_hit(ray, at, size[0], size[2])
-    return box_hit(ray, at, facing, size)
+        return cylinder_hit(ray, at, size[0], size[2], divergence_rad)
+    return box_hit(ray, at, facing, size, divergence_rad)
 
 
 @compiled
@@ -225,11 +229,11 @@ def _look(view: _View, number: int, columns: tuple[int, int], nearest: _Nearest)
                 chance = uniform(view.seed, (shot * len(solids.shape) + number) * DRAWS_A_RAY + LEAF_DRAW)
                 hit = crown_hit(ray, at, size, chance)
             else:
-                hit = _hit(solids, number, ray, at, facing)
-            if hit[0] < nearest.range_m[shot]:
-                nearest.range_m[shot] = hit[0]
-                nearest.cosine[shot] = hit[1]
-                nearest.solid[shot] = number
+                hit = _hit(solids, number, ray, at, facing, optics.divergence_rad)
+            part = 0 if hit[2] >= WHOLE else 1
+            if hit[0] < nearest.range_m[shot, part]:
+                nearest.range_m[shot, part], nearest.cosine[shot, part] = hit[0], hit[1]
+                nearest.share[shot, part], nearest.solid[shot, part] = hit[2], number
 
 
 @compiled
@@ -239,7 +243,7 @@ def _look_around(view: _View, nearest: _Nearest) -> None:
     for number in range(len(view.world.solids.shape)):
         size = view.world.solids.size[number]
         reach_m = math.hypot(size[0], size[1]) + SENSOR_MOVES_M
-        bearing, half, step = _columns(view.turning, view.here.foot[number], reach_m, view.optics.range_max_m)
+        bearing, half, step = _columns(view, view.here.foot[number], reach_m)
         if half < 0.0:
             continue
         if half >= math.pi:
@@ -254,13 +258,10 @@ def _look_around(view: _View, nearest: _Nearest) -> None:
 
 
 @compiled
-def _strength(view: _View, solid: int, hit: tuple[float, float, int]) -> float:
-    # of what comes back: range in m, cosine of incidence, material
-    optics, filled = view.optics, 1.0
-    if solid >= 0 and view.world.solids.shape[solid] == CYLINDER:
-        filled = min(1.0, 2.0 * view.world.solids.size[solid, 0] / (optics.divergence_rad * hit[0]))
-    share = optics.range_max_m / hit[0]
-    return float(view.world.reflectivity[hit[2]] * hit[1] * filled * share * share)
+def _strength(view: _View, hit: tuple[float, float, int]) -> float:
+    # of what comes back: range in m, cosine of incidence summed over the beam, material
+    share = view.optics.range_max_m / hit[0]
+    return float(view.world.reflectivity[hit[2]] * hit[1] * share * share)
 
 
 @compiled
@@ -270,7 +271,7 @@ def _receive(view: _View, shot: int, solid: int, hit: tuple[float, float, int], 
     loss, spread = _normals(view.seed, draw)
     noise, _ = _normals(view.seed, draw + 2)
     range_m = hit[0] + optics.range_sigma_m * noise
-    strength = _strength(view, solid, hit) * math.exp(optics.return_scatter * loss)
+    strength = _strength(view, hit) * math.exp(optics.return_scatter * loss)
     is_lost = strength < optics.return_limit or uniform(view.seed, draw + 4) < optics.dropout
     if is_lost or range_m < optics.range_min_m or range_m > optics.range_max_m:
         return
@@ -282,18 +283,33 @@ def _receive(view: _View, shot: int, solid: int, hit: tuple[float, float, int], 
 
 
 @compiled
+def _stronger(
+    view: _View, nearest: _Nearest, shot: int, solid: int, behind: tuple[float, float, int]
+) -> tuple[int, tuple[float, float, int]]:
+    # the solid and the hit that return more: what stops a part of the beam, or what is behind it and gets the rest
+    number = nearest.solid[shot, 1]
+    before = (nearest.range_m[shot, 1], nearest.cosine[shot, 1], view.world.solids.material[number])
+    rest = (behind[0], behind[1] * (1.0 - nearest.share[shot, 1]), behind[2])
+    if _strength(view, before) > _strength(view, rest):
+        return number, before
+    return solid, rest
+
+
+@compiled
 def _cast_sweep(view: _View, nearest: _Nearest, taken: Taken) -> None:
     _look_around(view, nearest)
     middle = view.turning.place[len(view.turning.place) // 2]
     near = streets_near(view.world.ground.street, middle[0], middle[1], GROUND_REACH_M)
     beams = view.optics.direction.shape[1]
     for shot in range(len(nearest.range_m)):
-        solid, range_m, cosine = nearest.solid[shot], nearest.range_m[shot], nearest.cosine[shot]
+        solid, range_m, cosine = nearest.solid[shot, 0], nearest.range_m[shot, 0], nearest.cosine[shot, 0]
         material = view.world.solids.material[solid] if solid >= 0 else 0
         ray = _ray(view.turning, view.optics, shot // beams, shot % beams)
         ground = ground_hit(view.world.ground, near, ray)
         if ground[0] < range_m:
             solid, range_m, cosine, material = NO_SOLID, ground[0], ground[1], ground[2]
+        if nearest.range_m[shot, 1] < range_m:
+            solid, (range_m, cosine, material) = _stronger(view, nearest, shot, solid, (range_m, cosine, material))
         if range_m < view.optics.range_max_m:
             _receive(view, shot, solid, (range_m, cosine, material), taken)
 
@@ -312,7 +328,9 @@ def cast_sweeps(world: World, optics: Optics, base: Floats, movers: Floats, seed
         place, axes = sensor_poses(world.ground.wave, optics, base[sweep])
         turning = _Turning(place, axes, base[sweep, :, 2] + optics.azimuth)
         view = _View(world, optics, turning, _placed(world.solids, movers[sweep]), seed[sweep])
-        nearest = _Nearest(np.full(shots, np.inf), np.zeros(shots), np.full(shots, NO_SOLID, dtype=np.int64))
+        nearest = _Nearest(
+            np.full((shots, 2), np.inf), np.zeros((shots, 2)), np.zeros((shots, 2)), np.full((shots, 2), NO_SOLID)
+        )
         row = Taken(range_m[sweep], intensity[sweep], material[sweep], solid[sweep])
         _cast_sweep(view, nearest, row)
     return Taken(range_m, intensity, material, solid)
