@@ -99,7 +99,7 @@ FLOWS: tuple[Flow, ...] = (
     Flow(GateAlarmed, FILTERING, (EVALUATION,)),
     Flow(LandmarksPerceived, PERCEPTION, (OPTIMISATION, EVALUATION)),
     Flow(OdometryMatched, PERCEPTION, (OPTIMISATION,)),
-    Flow(LoopClosed, PERCEPTION, (OPTIMISATION,)),
+    Flow(LoopClosed, PERCEPTION, (OPTIMISATION, EVALUATION)),
     Flow(LoopsSought, PERCEPTION, ()),
     Flow(TrajectorySolved, OPTIMISATION, (LANDMARKS, EVALUATION, TILES)),
     Flow(LandmarkSolved, OPTIMISATION, (LANDMARKS, EVALUATION, TILES)),
