@@ -64,6 +64,11 @@ class DataDirectory:
         return self.path / "aerial"
 
     @property
+    def shifts(self) -> Path:
+        """Where aerial images lie beside the ortho layer, a check layer each."""
+        return self.path / "shifts"
+
+    @property
     def solves(self) -> Path:
         """What builds kept so that measuring them needs no second solve."""
         return self.path / "solves"
@@ -72,6 +77,16 @@ class DataDirectory:
     def vehicles(self) -> Path:
         """The vehicles' own logs."""
         return self.path / "vehicles"
+
+    def kept_shifts(self, image: str) -> Path:
+        """The file of an image's check layer, its folder made. Raises InputError where it cannot be."""
+        if not self.path.is_dir():
+            raise InputError(f"{self.path}: no such data directory; `trigpoint ingest` makes one")
+        try:
+            self.shifts.mkdir(exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{self.shifts}: cannot be made: {error}") from error
+        return self.shifts / f"{image}.geojson"
 
     @contextmanager
     def opened_log(self) -> Iterator[McapLog]:
@@ -114,6 +129,10 @@ def _directory(context: click.Context, parameter: click.Parameter, value: Path) 
     return DataDirectory(value, asked_database(context))
 
 
+def _directory_if_any(context: click.Context, parameter: click.Parameter, value: Path | None) -> DataDirectory | None:
+    return None if value is None else _directory(context, parameter, value)
+
+
 def _directories(
     context: click.Context, parameter: click.Parameter, value: tuple[Path, ...]
 ) -> tuple[DataDirectory, ...]:
@@ -129,6 +148,10 @@ _AS_DIRECTORY: dict[str, Any] = {
 
 data_option: Callable[[Any], Any] = click.option(
     "--data", callback=_directory, help="The data directory.", **_AS_DIRECTORY
+)
+
+beside_data_option: Callable[[Any], Any] = click.option(
+    "--data", callback=_directory_if_any, help="The data directory, if any.", **{**_AS_DIRECTORY, "required": False}
 )
 
 several_data_option: Callable[[Any], Any] = click.option(

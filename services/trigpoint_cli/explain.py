@@ -7,7 +7,7 @@ import click
 from trigpoint_cli.data_dir import DataDirectory, as_of_option, data_option
 from trigpoint_cli.database import database_options
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering, counted, metres, utc
-from trigpoint_evaluation.core.explanation import Explanation, LoggedCorrection, Move, Sighting, TiedAnchor
+from trigpoint_evaluation.core.explanation import Explanation, LoggedCorrection, Move, Sighting, TiedAnchor, TiedLoop
 from trigpoint_evaluation.explaining import explained
 
 LISTED = 20  # lines of one kind on a screen; --json has all
@@ -46,6 +46,7 @@ def _values(found: Explanation) -> JsonObject:
             "items": list(map(_sighting_item, found.sightings)),
         },
         "anchors": list(map(_anchor_item, found.anchors)),
+        "loops": list(map(_loop_item, found.loops)),
         "corrections": list(map(_correction_item, found.corrections)),
         "versions": [asdict(one) for one in found.moves],
     }
@@ -78,6 +79,32 @@ def _anchor_item(one: TiedAnchor) -> JsonObject:
     }
 
 
+def _loop_item(one: TiedLoop) -> JsonObject:
+    event = one.loop.event
+    sigma = event.covariance.diagonal() ** 0.5
+    return {
+        "vehicle": event.vehicle,
+        "boot_id": event.boot_id,
+        "sequence": event.sweep_sequence,
+        "stamp_ns": one.loop.stamp_ns,
+        "other_vehicle": event.other_vehicle,
+        "other_boot_id": event.other_boot_id,
+        "other_sequence": event.other_sequence,
+        "other_stamp_ns": event.other_stamp_ns,
+        "motion": _motion((event.x_m, event.y_m, event.heading_rad)),
+        "sigma": _motion((float(sigma[0]), float(sigma[1]), float(sigma[2]))),
+        "residual": None if one.residual is None else _motion(one.residual),
+        "matched_share": event.matched_share,
+        "pairs": event.pairs,
+        "stream": one.loop.position.stream,
+        "number": one.loop.position.number,
+    }
+
+
+def _motion(values: tuple[float, float, float]) -> JsonObject:
+    return dict(zip(("x_m", "y_m", "heading_rad"), values, strict=True))
+
+
 def _correction_item(one: LoggedCorrection) -> JsonObject:
     said = asdict(one.event)
     return {
@@ -103,6 +130,10 @@ def _lines(found: Explanation) -> tuple[str, ...]:
         *_some(list(map(_sighting_line, found.sightings))),
         f"tied to {counted(len(found.anchors), 'anchor')}:" if found.anchors else "tied to no anchor",
         *map(_anchor_line, found.anchors),
+        f"seen from where {counted(len(found.loops), 'closed loop')} tied the drives:"
+        if found.loops
+        else "seen from where no loop was closed",
+        *_some(list(map(_loop_line, found.loops))),
         f"{counted(len(found.corrections), 'correction')} behind it:"
         if found.corrections
         else "no corrections behind it",
@@ -134,6 +165,19 @@ def _anchor_line(one: TiedAnchor) -> str:
     return (
         f"  {one.anchor} in {one.image or 'a survey'}: {one.reason}, residual {one.residual_m[0]:+.3f} "
         f"{one.residual_m[1]:+.3f} m{offset}  {one.position.stream} {one.position.number}"
+    )
+
+
+def _loop_line(one: TiedLoop) -> str:
+    event, place = one.loop.event, one.loop.position
+    left = "off the map's paths"
+    if one.residual is not None:
+        x_m, y_m, heading_rad = one.residual
+        left = f"residual {x_m:+.3f} {y_m:+.3f} m {heading_rad:+.4f} rad"
+    return (
+        f"  {utc(one.loop.stamp_ns)}  {event.vehicle} {event.boot_id} {event.sweep_sequence} to {event.other_vehicle} "
+        f"{event.other_boot_id} {event.other_sequence}: {left}, {counted(event.pairs, 'landmark')}, "
+        f"{event.matched_share:.0%} of points  {place.stream} {place.number}"
     )
 
 

@@ -1,6 +1,6 @@
 """`trigpoint ortho`: the lidar points of all drives as rasters, and where aerial images lie beside them."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
@@ -8,20 +8,19 @@ from typing import Any
 
 import click
 
-from trigpoint.durable_files import replace_durably
 from trigpoint.errors import InputError
 from trigpoint.logs.mcap_log import McapLog
 from trigpoint.logs.ports import RecallingLog
 from trigpoint.workers import workers
 from trigpoint_cli.anchors import anchor_values
 from trigpoint_cli.corrections import attributed
-from trigpoint_cli.data_dir import DataDirectory, cluster_option, data_option
+from trigpoint_cli.data_dir import DataDirectory, beside_data_option, cluster_option, data_option
 from trigpoint_cli.output import Answer, JsonObject, Screen, answering, counted
 from trigpoint_ingest.core.anchors import IMAGE_SIGMA_M, SIGMA_LARGEST_M, AnchorRow
 from trigpoint_ingest.measured_anchors import replace_measured
 from trigpoint_tiles.anchoring import anchors_by_image
 from trigpoint_tiles.app import FORMATS, Rendered, RenderedGrid, render_ortho
-from trigpoint_tiles.core.check_layer import check_layer
+from trigpoint_tiles.check_layer_files import write_check_layer
 from trigpoint_tiles.core.image_anchors import ImageAnchor
 from trigpoint_tiles.core.image_tiles import ImageRegistration, TileRegistration
 from trigpoint_tiles.core.registration import REACH_M, REACH_MOST_M
@@ -158,14 +157,31 @@ def _registration_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 @command.command("register")
 @_registration_options
-@click.option("--out", metavar="FILE", type=FILE, help="The tiles' shifts as GeoJSON too, for GIS programs.")
+@click.option(
+    "--out", metavar="FILE", type=FILE, help="The tiles' shifts for GIS programs: a .gpkg styled for QGIS, or GeoJSON."
+)
+@beside_data_option
 @answering
-def register(ortho: Path, image: Path, *, reach_m: float, out: Path | None, screen: Screen) -> Answer:
-    """Measure where an aerial image shows the ground, less where the ortho layer has it, tile by tile."""
+def register(
+    ortho: Path, image: Path, *, reach_m: float, out: Path | None, data: DataDirectory | None, screen: Screen
+) -> Answer:
+    """Measure where an aerial image shows the ground, less where the ortho layer has it, tile by tile.
+
+    With --data the viewer of that data directory shows the shifts, too.
+    """
+    named = image.stem
+    if not named:
+        raise InputError(f"--image {image}: it has no name of its own; call it by its folder's name")
+    kept = () if data is None else (data.kept_shifts(named),)
     with screen.part_of("registering tiles") as progress:
         found = register_image(ortho, image, reach_m=reach_m, progress=progress)
-    if out is not None:
-        _write(out, check_layer(found, image=image.stem))
+    files = (*(() if out is None else (out,)), *kept)
+    for path in files:
+        write_check_layer(path, found, image=named)
+    return _registered_answer(found, files)
+
+
+def _registered_answer(found: ImageRegistration, files: Sequence[Path]) -> Answer:
     shift_m, covariance_m2 = found.joined()
     sigma_m = covariance_m2.diagonal() ** 0.5
     accepted = len(found.accepted)
@@ -175,15 +191,10 @@ def register(ortho: Path, image: Path, *, reach_m: float, out: Path | None, scre
         "shift_m": {"east": shift_m[0], "north": shift_m[1]},
         "sigma_m": {"east": sigma_m[0], "north": sigma_m[1]},
         "tiles": {"count": len(found.tiles), "accepted": accepted, "items": list(map(_tile_values, found.tiles))},
+        "files": list(map(str, files)),
     }
-    return Answer(values, (*map(_tile_line, found.tiles), _whole_line(found)))
-
-
-def _write(path: Path, content: str) -> None:
-    try:
-        replace_durably(path, content.encode())
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error}") from error
+    wrote = (f"wrote {path}" for path in files)
+    return Answer(values, (*map(_tile_line, found.tiles), _whole_line(found), *wrote))
 
 
 @command.command("anchors")

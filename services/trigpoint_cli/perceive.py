@@ -81,10 +81,12 @@ def _loop_item(one: LoopReport) -> JsonObject:
         "proposed": one.proposed,
         "verified": one.verified,
         "refused": dict(one.refused),
+        "drives_apart": one.drives_apart,
         "appended": one.appended,
     }
 
 
 def _loop_line(one: LoopReport) -> str:
     reasons = "".join(f"; {count} refused: {reason}" for reason, count in one.refused)
-    return f"{one.vehicle}: {counted(one.proposed, 'loop')} proposed, {one.verified} closed{reasons}"
+    apart = f"; {counted(one.drives_apart, 'drive')} elsewhere not searched" if one.drives_apart else ""
+    return f"{one.vehicle}: {counted(one.proposed, 'loop')} proposed, {one.verified} closed{reasons}{apart}"

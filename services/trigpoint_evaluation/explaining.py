@@ -13,16 +13,18 @@ from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.mapped import AnchorAssociated, ImageOffsetSolved, Mapped, MapSolved, TrajectorySolved
 from trigpoint.events.names import nearest_names
 from trigpoint.events.observed import LandmarksDetected, VehicleDescribed
-from trigpoint.events.perceived import LandmarksPerceived
+from trigpoint.events.perceived import LandmarksPerceived, LoopClosed
 from trigpoint.landmarks.model import Landmark, MapVersion, valid_at
 from trigpoint.landmarks.ports import LandmarkStore
 from trigpoint.landmarks.queries import Disc, LandmarkQuery, require_known_version
-from trigpoint.logs.perceived_readings import PERCEIVED_STREAM, detected_in
+from trigpoint.logs.as_of import LogAsOf
+from trigpoint.logs.perceived_readings import PERCEIVED_STREAM, closed_loops, detected_in
 from trigpoint.logs.ports import EventLog, LoggedBoot, LoggedEvent
 from trigpoint_evaluation.core.explanation import (
     AnchorName,
     DriveName,
     Explanation,
+    LoggedLoop,
     Sighting,
     TiedAnchor,
     corrections_behind,
@@ -32,6 +34,7 @@ from trigpoint_evaluation.core.explanation import (
     sensor_pose,
     sweeps_of,
 )
+from trigpoint_evaluation.core.loop_ties import loops_behind
 
 MAP_STREAM = STREAM_PATTERNS[MapSolved]
 LABEL_STREAM = STREAM_PATTERNS[AnchorLabelled]
@@ -63,8 +66,8 @@ def explained(log: EventLog, store: LandmarkStore, landmark: str, *, as_of: int 
         raise InputError(_absence(store, landmark, history, map_version))
     before = tuple(one for one in history if one.valid_from_version <= map_version)
     parts = _parts_of(log, versions, row, map_version)
-    whole = _whole_below(versions, map_version).map_version
-    seen_by = sweeps_of(rows_behind(history, whole=whole, map_version=map_version))
+    whole = _whole_below(versions, map_version)
+    seen_by = sweeps_of(rows_behind(history, whole=whole.map_version, map_version=map_version))
     sightings = tuple(
         sighting for drive, sweeps in seen_by.items() for sighting in _seen(log, row, drive, sweeps, parts)
     )
@@ -74,6 +77,7 @@ def explained(log: EventLog, store: LandmarkStore, landmark: str, *, as_of: int 
         sightings=tuple(sorted(sightings, key=lambda one: (one.stamp_ns, one.vehicle))),
         missing=sum(map(len, seen_by.values())) - len(sightings),
         anchors=tuple(_tied_anchor(event, position, parts) for event, position in parts.tied.values()),
+        loops=loops_behind(_loops(log, whole, parts), sightings, parts.paths),
         corrections=corrections_behind(
             _corrections(log),
             anchors=_anchors_ever(log, versions, before, parts),
@@ -232,6 +236,15 @@ def _tied_anchor(event: AnchorAssociated, position: LogPosition, parts: _Parts) 
         map_version=event.map_version,
         position=position,
     )
+
+
+def _loops(log: EventLog, whole: MapVersion, parts: _Parts) -> Iterable[LoggedLoop]:
+    """The loops that a version solved whole was solved with, of drives that have paths."""
+    then = LogAsOf(log, cast(list[tuple[str, int]], json.loads(whole.inputs_json)))
+    for rows in closed_loops(then, parts.paths.keys()).values():
+        for row in rows:
+            event = cast(LoopClosed, row.envelope.event)
+            yield LoggedLoop(position=row.position, stamp_ns=row.envelope.stamp_ns, event=event)
 
 
 def _anchors_ever(

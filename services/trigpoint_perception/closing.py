@@ -7,6 +7,9 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import cast
 
+import numpy as np
+from numpy.typing import NDArray
+
 from trigpoint.errors import ServiceError
 from trigpoint.events.codec import Event
 from trigpoint.events.corrected import excluded_drives
@@ -34,6 +37,7 @@ from trigpoint_perception.core.closures.submaps import submaps_of
 from trigpoint_perception.core.following import NumberedSweep
 from trigpoint_perception.core.publication import numbered
 from trigpoint_perception.settings import PerceptionSettings
+from trigpoint_perception.whereabouts import Whereabouts
 
 STREAM_OF_VEHICLE = STREAM_PATTERNS[PointsScanned]
 
@@ -43,7 +47,7 @@ DriveName = tuple[str, str]
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopReport:
     """What became of a drive's loops, by all searches: places proposed, verified, refused by reason; events appended
-    now."""
+    now; `drives_apart`: drives before it in whose places its own were not sought, since they cannot have met."""
 
     vehicle: str
     boot_id: str
@@ -51,6 +55,7 @@ class LoopReport:
     verified: int
     refused: tuple[tuple[str, int], ...]
     appended: int
+    drives_apart: int
 
 
 @dataclass(slots=True)
@@ -86,6 +91,11 @@ class _Told:
             self.searches.append(event)
 
     @property
+    def swept_ns(self) -> NDArray[np.int64]:
+        """When the matched sweeps were."""
+        return np.array([*self.stamp_ns, *(each.from_stamp_ns for each in self.motions)], dtype=np.int64)
+
+    @property
     def sought(self) -> set[DriveName]:
         """The drives among which this one's places were sought already."""
         return {(each.vehicle, each.boot_id) for search in self.searches for each in search.among}
@@ -116,13 +126,14 @@ def close_loops(
 ) -> tuple[LoopReport, ...]:
     """The places of every perceived drive that is not excluded sought among those of drives perceived before it and its
     own, by some workers, each of which opens the log to read points; told of in `log`; again: nothing is appended
-    twice, and a drive that came since is sought for alone.
+    twice, and a drive that came since is sought for alone. Drives whose fixes say that they cannot have met are passed
+    over.
 
     A drive that cannot be read costs no other. Raises AppendFailed, and once all others are done ServiceError.
     """
     chosen = settings or ClosureSettings()
     told = _told_of(log, chosen)
-    searches = _due(told)
+    searches, apart = _due(told, Whereabouts(log, {name: each.swept_ns for name, each in told.items()}))
     appended: Counter[DriveName] = Counter()
     failures = []
     work = partial(found_in, open_log, chosen)
@@ -135,7 +146,7 @@ def close_loops(
         progress(number, len(searches))
     if failures:
         raise ServiceError(f"loops of {len(failures)} of {len(searches)} drives not closed: {'; '.join(failures)}")
-    return tuple(_report(name, told[name], appended[name]) for name in told)
+    return tuple(_report(name, told[name], appended=appended[name], apart=apart[name]) for name in told)
 
 
 def _told_of(log: EventLog, settings: ClosureSettings) -> dict[DriveName, _Told]:
@@ -150,8 +161,9 @@ def _told_of(log: EventLog, settings: ClosureSettings) -> dict[DriveName, _Told]
     return told
 
 
-def _due(told: dict[DriveName, _Told]) -> list[Search]:
-    """Each drive with those before it, and itself, among which its places were not sought yet."""
+def _due(told: dict[DriveName, _Told], whereabouts: Whereabouts) -> tuple[list[Search], Counter[DriveName]]:
+    """Each drive with those before it, and itself, among which its places were not sought yet; and how many of these
+    were passed over, as they cannot have met."""
     runs: dict[DriveName, tuple[Run, ...]] = {}
 
     def runs_by(name: DriveName) -> tuple[Run, ...]:
@@ -159,13 +171,16 @@ def _due(told: dict[DriveName, _Told]) -> list[Search]:
             runs[name] = tuple(runs_of(told[name].motions, told[name].stamp_ns, told[name].seen))
         return runs[name]
 
-    searches, names = [], list(told)
+    searches, names, apart = [], list(told), Counter[DriveName]()
     for number, name in enumerate(names):
-        among = [other for other in names[: number + 1] if other not in told[name].sought]
+        sought = told[name].sought
+        open_yet = [other for other in names[: number + 1] if other not in sought]
+        among = [other for other in open_yet if other == name or not whereabouts.apart(name, other)]
+        apart[name] = len(open_yet) - len(among)
         if among:
             others = tuple((other, runs_by(other)) for other in among)
             searches.append(Search(name=name, runs=runs_by(name), among=others))
-    return searches
+    return searches, apart
 
 
 def found_in(open_log: Callable[[], EventLog], settings: ClosureSettings, search: Search) -> list[Attempt]:
@@ -231,7 +246,7 @@ def _pair(closed: LoopClosed) -> tuple[object, ...]:
     return closed.sensor, closed.sweep_sequence, *other
 
 
-def _report(name: DriveName, told: _Told, appended: int) -> LoopReport:
+def _report(name: DriveName, told: _Told, *, appended: int, apart: int) -> LoopReport:
     refused: Counter[str] = Counter()
     for search in told.searches:
         refused.update({each.reason: each.count for each in search.refused})
@@ -242,4 +257,5 @@ def _report(name: DriveName, told: _Told, appended: int) -> LoopReport:
         verified=sum(search.verified for search in told.searches),
         refused=tuple(sorted(refused.items())),
         appended=appended,
+        drives_apart=apart,
     )

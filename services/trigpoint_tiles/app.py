@@ -20,7 +20,7 @@ from trigpoint.workers import Tally
 from trigpoint_tiles.clouds import DriveClouds, logged_clouds
 from trigpoint_tiles.core.grid import RasterGrid, Tile, TileBox, box_of, projected_grid, web_mercator_grid
 from trigpoint_tiles.core.pictures import picture
-from trigpoint_tiles.geotiff import write_cog
+from trigpoint_tiles.geotiff import COORDINATE_EPOCH, MAP_VERSION, write_cog
 from trigpoint_tiles.grid_layer import BroughtUp, GridLayer
 from trigpoint_tiles.hands import Hands, own_hands
 from trigpoint_tiles.picture_files import PictureFolder, bounds_deg, write_pmtiles
@@ -118,10 +118,10 @@ def _tags(
     epoch = datetime.fromtimestamp(newest_ns / 1e9, tz=UTC)
     begin_s = datetime(epoch.year, 1, 1, tzinfo=UTC).timestamp()
     return {
-        "MAP_VERSION": str(solved.head.map_version),
+        MAP_VERSION: str(solved.head.map_version),
         "MAP_CRS": frame.crs,
         "MAP_OPERATION": frame.operation,
-        "COORDINATE_EPOCH": f"{epoch.year + (newest_ns / 1e9 - begin_s) / YEAR_S:.3f}",
+        COORDINATE_EPOCH: f"{epoch.year + (newest_ns / 1e9 - begin_s) / YEAR_S:.3f}",
         "DESKEWED": "YES" if settings.deskew else "NO",
         "ATTRIBUTION": settings.attribution,
         "TIFFTAG_SOFTWARE": "trigpoint",
@@ -225,7 +225,7 @@ def viewer_configuration(
     lines = (
         "[[web.rasters]]",
         f"name = {json.dumps(NAME)}",
-        f"title = {json.dumps('Lidar, map version ' + job.tags['MAP_VERSION'])}",
+        f"title = {json.dumps('Lidar, map version ' + job.tags[MAP_VERSION])}",
         'kind = "ortho"',
         f"folder = {json.dumps(str(folder.resolve()))}",
         f"bounds = [{', '.join(f'{edge:.9f}' for edge in bounds)}]",

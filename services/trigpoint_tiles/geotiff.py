@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 MARGIN_PX = 4  # more than a cubic looks at
 COLOURS_MOST = 3  # what follows is infrared, if not alpha
-MAP_VERSION = "MAP_VERSION"  # of a layer's metadata
+MAP_VERSION, COORDINATE_EPOCH = "MAP_VERSION", "COORDINATE_EPOCH"  # of a layer's metadata
 CACHE_BYTES = 64 * 1024**2  # of GDAL's blocks
 WORKING = {"driver": "GTiff", "dtype": "float32", "tiled": True, "compress": "zstd", "zstd_level": 1}
 OPTIMISED = {"compress": "DEFLATE", "predictor": "YES", "blocksize": 512, "bigtiff": "IF_SAFER"}

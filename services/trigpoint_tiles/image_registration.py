@@ -12,7 +12,7 @@ from trigpoint.logs.readings import Progress, in_silence
 from trigpoint_tiles.core.image_tiles import ImageRegistration, TileRegistration, agreeing
 from trigpoint_tiles.core.registration import REACH_M, registered, unknown
 from trigpoint_tiles.core.rendering import BANDS, HEIGHT_ABOVE_M, REFLECTIVITY
-from trigpoint_tiles.geotiff import MAP_VERSION, RasterFile, RasterPlace
+from trigpoint_tiles.geotiff import COORDINATE_EPOCH, MAP_VERSION, RasterFile, RasterPlace
 
 Floats = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ def register_image(
             if min(np.isfinite(one[0, inside, inside]).mean() for one in (seen, shown)) >= COVERED_LEAST:
                 tiles.append(_registered(place, seen, shown, reach_m))
             progress(number, len(places))
-        crs, version = layer.crs, layer.tag(MAP_VERSION)
+        crs, version, epoch = layer.crs, layer.tag(MAP_VERSION), layer.tag(COORDINATE_EPOCH)
     if not tiles:
         raise InputError(f"{image} and {ortho} have no tile of {TILE_M:g} m that both cover to {COVERED_LEAST:.0%}")
     return ImageRegistration(
@@ -51,6 +51,7 @@ def register_image(
         map_version=None if version is None else int(version),
         pixel_m=pixel_m,
         tiles=agreeing(tiles),
+        coordinate_epoch=None if epoch is None else float(epoch),
     )
 
 

@@ -64,13 +64,14 @@ def asked_api(
     *,
     corrections: MapCorrections | None = None,
     drives: MeasuredDrives | None = None,
+    shifts: Path | None = None,
 ) -> Iterator[Api]:
     """The application on a source."""
     chosen = settings or WebSettings()
     watch, instruments = MapWatch(source, look_s=chosen.look_s), Instruments("http")
 
     async def made() -> Any:
-        served = Served(source=source, watch=watch, corrections=corrections, drives=drives)
+        served = Served(source=source, watch=watch, corrections=corrections, drives=drives, shifts=shifts)
         return application(chosen, served, instruments)
 
     yield Api(runner, runner.run(made()), watch, corrections, instruments)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from scanned_worlds.casting import PERIOD_NS, SIXTEEN, START_NS, STREET, driven_pose, swept
+from scanned_worlds.casting import PERIOD_NS, SIXTEEN, START_NS, STREET, World, driven_pose, swept
 from trigpoint.events.codec import Event
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.observed import GnssFixReceived, VehicleDescribed, WheelSpeedMeasured
@@ -15,7 +15,9 @@ VELOCITY = (6.0, 0.2)  # m/s, rad/s
 FIX_NS = 500_000_000
 
 
-def scanned_drive(vehicle: str, sweeps: int, *, boot_id: str = "boot-1") -> Iterator[Envelope[Event]]:
+def scanned_drive(
+    vehicle: str, sweeps: int, *, boot_id: str = "boot-1", world: World = STREET
+) -> Iterator[Envelope[Event]]:
     """A described vehicle with wheels and a 16-beam lidar: a speed and a sweep ten times a second."""
 
     def row(sequence: int, stamp_ns: int, event: Event) -> Envelope[Event]:
@@ -25,7 +27,7 @@ def scanned_drive(vehicle: str, sweeps: int, *, boot_id: str = "boot-1") -> Iter
     speed = WheelSpeedMeasured(speed_mps=VELOCITY[0], steering_rad=math.nan, yaw_rate_radps=VELOCITY[1])
     for number in range(sweeps):
         stamp_ns = START_NS + number * PERIOD_NS
-        scanned = swept(STREET, SIXTEEN, pose=driven_pose(VELOCITY, 0.1 * number), velocity=VELOCITY)
+        scanned = swept(world, SIXTEEN, pose=driven_pose(VELOCITY, 0.1 * number), velocity=VELOCITY)
         yield row(2 * number + 1, stamp_ns, speed)
         yield row(2 * number + 2, stamp_ns, scanned)
 

@@ -27,7 +27,7 @@ def opened(settings: Settings, instruments: Instruments) -> Iterator[Service]:
                 password_file=settings.database.password_file,
                 connections=settings.web.connections,
             ),
-            log=ServedLog(corrections=LoggedCorrections(data), drives=LoggedMeasurements(data)),
+            log=ServedLog(corrections=LoggedCorrections(data), drives=LoggedMeasurements(data), shifts=data.shifts),
             bus=bus,
             root=settings.fleet.root,
             instruments=instruments,

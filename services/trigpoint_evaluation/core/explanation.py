@@ -11,6 +11,7 @@ from trigpoint.events.corrected import AnchorLabelled, AnchorRetracted, Correcte
 from trigpoint.events.envelope import LogPosition
 from trigpoint.events.mapped import TrajectorySolved
 from trigpoint.events.observed import LandmarkDetection, VehicleDescribed
+from trigpoint.events.perceived import LoopClosed
 from trigpoint.geodesy.poses import Pose2
 from trigpoint.landmarks.model import Landmark
 
@@ -45,6 +46,25 @@ class TiedAnchor:
     offset_m: tuple[float, float] | None
     map_version: int
     position: LogPosition
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoggedLoop:
+    """A closed loop and where it stands in the log; `stamp_ns` of its own sweep."""
+
+    position: LogPosition
+    stamp_ns: int
+    event: LoopClosed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TiedLoop:
+    """A loop with an end on a leg the landmark was seen from, and what is left of it: loop minus paths, x, y in m and
+    heading in rad in the frame of the other sweep's base; near zero where the map holds to it, large where the solve
+    let it go, None where a path does not cover its sweep."""
+
+    loop: LoggedLoop
+    residual: tuple[float, float, float] | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,6 +104,7 @@ class Explanation:
     sightings: tuple[Sighting, ...]
     missing: int
     anchors: tuple[TiedAnchor, ...]
+    loops: tuple[TiedLoop, ...]
     corrections: tuple[LoggedCorrection, ...]
     moves: tuple[Move, ...]
 
@@ -131,17 +152,25 @@ def _move(last: Landmark | None, row: Landmark) -> Move:
     )
 
 
-def sensor_pose(path: TrajectorySolved | None, described: VehicleDescribed, stamp_ns: int) -> Pose2 | None:
-    """T_map_sensor at a time; None for a time the path does not cover."""
+def base_pose(path: TrajectorySolved | None, stamp_ns: int) -> Pose2 | None:
+    """T_map_base at a time; None for a time the path does not cover."""
     if path is None or not len(path.stamp_ns) or not path.stamp_ns[0] <= stamp_ns <= path.stamp_ns[-1]:
         return None
     since_s = (path.stamp_ns - stamp_ns) * 1e-9
     heading = np.unwrap(path.pose[:, 2])
     x_m, y_m, heading_rad = (float(np.interp(0.0, since_s, column)) for column in (*path.pose[:, :2].T, heading))
+    return Pose2(x_m, y_m, heading_rad)
+
+
+def sensor_pose(path: TrajectorySolved | None, described: VehicleDescribed, stamp_ns: int) -> Pose2 | None:
+    """T_map_sensor at a time; None for a time the path does not cover."""
+    T_map_base = base_pose(path, stamp_ns)
+    if T_map_base is None:
+        return None
     T_base_sensor = Pose2(
         described.landmark_sensor_x_m, described.landmark_sensor_y_m, described.landmark_sensor_yaw_rad
     )
-    return Pose2(x_m, y_m, heading_rad).compose(T_base_sensor)
+    return T_map_base.compose(T_base_sensor)
 
 
 def detection_of(

@@ -5,7 +5,13 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
-from trigpoint.landmarks.geopackage_writing import GeoPackageWriting, Row, WrittenTable, written_geopackage
+from trigpoint.landmarks.geopackage_writing import (
+    ANY_METADATA,
+    GeoPackageWriting,
+    Row,
+    WrittenTable,
+    written_geopackage,
+)
 from trigpoint.landmarks.layers import Layer
 from trigpoint_landmarks.export.columns import cells_of, columns_of
 from trigpoint_landmarks.export.export import Export
@@ -13,7 +19,6 @@ from trigpoint_landmarks.export.provenance import NS_PER_S
 from trigpoint_landmarks.export.qgis_styles import style_document
 
 SQL_TYPES = {"string": "TEXT", "number": "REAL", "integer": "INTEGER", "boolean": "BOOLEAN"}
-STANDARD = "https://www.geopackage.org/guidance/extensions/metadata.html"  # any metadata, as its mime type says
 
 
 def write_geopackage(path: Path, export: Export) -> None:
@@ -25,7 +30,7 @@ def write_geopackage(path: Path, export: Export) -> None:
         for layer in export.layers:
             _write_layer(file, export, layer)
         metadata = json.dumps(provenance.values(), ensure_ascii=False)
-        file.describe(metadata, mime_type="application/json", standard=STANDARD)
+        file.describe(metadata, mime_type="application/json", standard=ANY_METADATA)
 
 
 def _write_layer(file: GeoPackageWriting, export: Export, layer: Layer) -> None:

@@ -6,11 +6,11 @@ from typing import TextIO
 from xml.sax.saxutils import escape, quoteattr
 
 from trigpoint.landmarks.layers import ANCHORS, LANDMARKS, Layer
+from trigpoint.landmarks.xml_text import xml_text
 from trigpoint_landmarks.export.colours import PALETTE, colour_number
 from trigpoint_landmarks.export.columns import Cell, Column, cells_of, columns_of
 from trigpoint_landmarks.export.export import Export, told_apart_by
 from trigpoint_landmarks.export.placed import PlacedFeature, Points
-from trigpoint_landmarks.export.xml_text import xml_text
 
 KINDS = {"string": "string", "number": "double", "integer": "int", "boolean": "bool"}
 LINE_WIDTH_PX = 2

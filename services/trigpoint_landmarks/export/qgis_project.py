@@ -8,15 +8,14 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 
 from trigpoint.geodesy.projection import crs_definition, crs_wkt2
 from trigpoint.landmarks.layers import Layer
+from trigpoint.landmarks.qgis_symbols import DOCTYPE, QGIS_VERSION
+from trigpoint.landmarks.xml_text import xml_text
 from trigpoint_landmarks.export.qgis_styles import (
-    DOCTYPE,
-    QGIS_VERSION,
     RESIDUAL_SCALE,
     SIGMAS,
     renderer,
     tile_renderer,
 )
-from trigpoint_landmarks.export.xml_text import xml_text
 
 GROUP = "Landmark map"
 VARIABLES = {SIGMAS: "1", RESIDUAL_SCALE: "1"}

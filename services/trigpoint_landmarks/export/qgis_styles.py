@@ -5,36 +5,34 @@ ellipses and residuals, which are centimetres on a map of kilometres.
 """
 
 from collections.abc import Callable, Sequence
-from xml.etree.ElementTree import Element, SubElement, tostring
+from xml.etree.ElementTree import Element, SubElement
 
 from trigpoint.landmarks.layers import ANCHORS, LANDMARKS, Layer
-from trigpoint_landmarks.export.colours import PALETTE, colour_of
-from trigpoint_landmarks.export.qgis_symbols import (
+from trigpoint.landmarks.qgis_symbols import (
+    RENDERED,
     Colour,
     arrow,
+    categorized,
     generated,
     simple_fill,
     simple_line,
     simple_marker,
+    style_text,
     symbol,
 )
-from trigpoint_landmarks.export.xml_text import xml_text
+from trigpoint.landmarks.xml_text import xml_text
+from trigpoint_landmarks.export.colours import PALETTE, colour_of
 
-QGIS_VERSION = "3.22"
 SIGMAS, RESIDUAL_SCALE = "trigpoint_sigmas", "trigpoint_residual_scale"
 OTHER_COLOUR = (120, 120, 120)
 RESIDUAL_COLOUR = (160, 0, 60)
 ELLIPSE_SEGMENTS = 36
-RENDERED = {"symbollevels": "0", "enableorderby": "0", "forceraster": "0", "referencescale": "-1"}
-DOCTYPE = "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n"
 DRIVE = '"vehicle" || \':\' || "boot_id"'
 
 
 def style_document(layer: Layer, crs: str, map_crs: str, kinds: Sequence[str]) -> str:
     """The style of a layer in `crs` as QML; each of its kinds is drawn in its own colour."""
-    root = Element("qgis", {"version": QGIS_VERSION, "styleCategories": "Symbology"})
-    root.append(renderer(layer, crs, map_crs, kinds))
-    return DOCTYPE + tostring(root, encoding="unicode")
+    return style_text(renderer(layer, crs, map_crs, kinds))
 
 
 def renderer(layer: Layer, crs: str, map_crs: str, kinds: Sequence[str]) -> Element:
@@ -109,14 +107,13 @@ def _drive_colour() -> str:
 
 def _by_kind(kinds: Sequence[str], drawn: Callable[[Colour, str], Element]) -> Element:
     """A colour a kind, and one for whatever comes later."""
-    element = Element("renderer-v2", {"type": "categorizedSymbol", "attr": "kind", **RENDERED})
-    categories, symbols = SubElement(element, "categories"), SubElement(element, "symbols")
-    for number, kind in enumerate((*filter(None, kinds), "")):
-        label = xml_text(kind) or "others"
-        said = {"symbol": str(number), "value": xml_text(kind), "label": label, "render": "true"}
-        SubElement(categories, "category", said)
-        symbols.append(drawn(colour_of(kind) if kind else OTHER_COLOUR, str(number)))
-    return element
+    return categorized(
+        "kind",
+        [
+            (xml_text(kind), xml_text(kind) or "others", drawn(colour_of(kind) if kind else OTHER_COLOUR, str(number)))
+            for number, kind in enumerate((*filter(None, kinds), ""))
+        ],
+    )
 
 
 def _single(drawn: Element) -> Element:

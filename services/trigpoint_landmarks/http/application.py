@@ -5,6 +5,7 @@ import json
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from http import HTTPStatus
+from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI
@@ -39,6 +40,7 @@ from trigpoint_landmarks.http.ports import MapCorrections, MeasuredDrives
 from trigpoint_landmarks.http.problems import Problem, problem_of, problem_response
 from trigpoint_landmarks.http.rasters import Rasters
 from trigpoint_landmarks.http.settings import MEBIBYTE, WebSettings
+from trigpoint_landmarks.http.shifts import Shifts
 from trigpoint_landmarks.http.tiles import Held, Tiles, asked_version, tile_of, tiled_layer
 from trigpoint_landmarks.http.viewer_api import ViewerApi
 from trigpoint_landmarks.http.viewer_files import PREFIX as VIEWER_PREFIX
@@ -235,12 +237,14 @@ def corrections_definition() -> JsonObject:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Served:
-    """What is served: a database, what is known of it, and, where there is a log, what it holds and takes."""
+    """What is served: a database, what is known of it, where there is a log what it holds and takes, and where there is
+    a folder of check layers, those."""
 
     source: FeatureSource
     watch: MapWatch
     corrections: MapCorrections | None = None
     drives: MeasuredDrives | None = None
+    shifts: Path | None = None
 
 
 def application(settings: WebSettings, served: Served, instruments: Instruments) -> Any:
@@ -290,6 +294,7 @@ def _viewer_api(settings: WebSettings, served: Served, facts: FactsOfMap) -> Vie
         advice=AnchorAdvice(facts, drives.in_force),
         drives=drives,
         rasters=Rasters({one.name: one for one in settings.rasters}),
+        shifts=Shifts(served.shifts),
         can_write=served.corrections is not None,
     )
 

@@ -43,7 +43,7 @@ DRIVE = query("drive", "Of this drive only: its vehicle and boot with a colon be
 
 def viewer_paths() -> JsonObject:
     """The paths of what a viewer asks."""
-    return {**_advice_paths(), **_log_paths(), **_raster_paths(), **_service_paths()}
+    return {**_advice_paths(), **_log_paths(), **_raster_paths(), **_shift_paths(), **_service_paths()}
 
 
 def _shaped(**properties: JsonObject) -> JsonObject:
@@ -195,6 +195,19 @@ def _raster_paths() -> JsonObject:
             "rasters", "Pictures of the ground", answers(JSON, _shaped(rasters=_list(one))), JSON_ONLY, tag=TAG
         ),
         "/rasters/{name}/{z}/{x}/{y}": getting("raster_tile", "A picture's tile", tile, *place, JSON_ONLY, tag=TAG),
+    }
+
+
+def _shift_paths() -> JsonObject:
+    tiles = {
+        **answers(GEOJSON, object_with("type", "features")),
+        "304": {"description": "It is as the client has it"},
+    }
+    image = path_part("image", "The image's name", {"type": "string", "minLength": 1})
+    listed = answers(JSON, _shaped(shifts=_list(object_with("image", "tiles"))))
+    return {
+        "/shifts": getting("shifts", "Images registered to the ortho layer", listed, JSON_ONLY, tag=TAG),
+        "/shifts/{image}": getting("shift_layer", "An image's shift by tiles", tiles, image, JSON_ONLY, tag=TAG),
     }
 
 

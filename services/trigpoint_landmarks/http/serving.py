@@ -6,6 +6,7 @@ import socket
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import uvicorn
 import uvloop
@@ -31,10 +32,11 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServedLog:
-    """What a log takes and what it holds; None: there is no log."""
+    """What a log takes and what it holds, and the folder of check layers beside it; None: there is none."""
 
     corrections: MapCorrections | None = None
     drives: MeasuredDrives | None = None
+    shifts: Path | None = None
 
 
 NO_LOG = ServedLog()
@@ -90,7 +92,8 @@ class HttpService:
     async def _serve(self, stop: threading.Event) -> None:
         source = self._open_source()
         watch = MapWatch(source, look_s=self._settings.look_s)
-        served = Served(source=source, watch=watch, corrections=self._log.corrections, drives=self._log.drives)
+        log = self._log
+        served = Served(source=source, watch=watch, corrections=log.corrections, drives=log.drives, shifts=log.shifts)
         server = uvicorn.Server(self._configuration(application(self._settings, served, self._instruments)))
         following = asyncio.create_task(watch.follow())
         listening = asyncio.create_task(self._listen(watch, stop))

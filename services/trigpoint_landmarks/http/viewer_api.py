@@ -18,6 +18,7 @@ from trigpoint_landmarks.http.map_watch import MapWatch
 from trigpoint_landmarks.http.problems import Problem
 from trigpoint_landmarks.http.rasters import Rasters
 from trigpoint_landmarks.http.settings import WebSettings
+from trigpoint_landmarks.http.shifts import Shifts
 from trigpoint_landmarks.http.tiles import tile_of
 from trigpoint_landmarks.http.tokens import Scope
 
@@ -51,6 +52,7 @@ class ViewerApi:
     advice: AnchorAdvice
     drives: LoggedDrives
     rasters: Rasters
+    shifts: Shifts
     can_write: bool
 
     async def association(self, request: Request) -> Response:
@@ -96,6 +98,16 @@ class ViewerApi:
         row, _, ending = path["row"].rpartition(".")
         tile = tile_of(path["zoom"], path["column"], row)
         return await self.rasters.tile(path["name"], tile, ending, etag=request.headers.get("if-none-match", ""))
+
+    async def shift_list(self, request: Request) -> Response:
+        """The images whose shift against the ortho layer was measured."""
+        self._asked(request, ())
+        return _json(await self.shifts.document())
+
+    async def shift_layer(self, request: Request) -> Response:
+        """An image's shift, tile by tile."""
+        self._asked(request, ())
+        return await self.shifts.layer(request.path_params["image"], etag=request.headers.get("if-none-match", ""))
 
     async def access(self, request: Request) -> Response:
         """What whoever asks may do."""
@@ -152,6 +164,8 @@ class ViewerApi:
             "/labels": self.labels,
             "/rasters": self.raster_list,
             RASTER_TILE: self.raster_tile,
+            "/shifts": self.shift_list,
+            "/shifts/{image}": self.shift_layer,
             ACCESS_PATH: self.access,
         }
 

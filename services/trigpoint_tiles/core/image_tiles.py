@@ -38,13 +38,15 @@ class TileRegistration:
 class ImageRegistration:
     """Every tile both cover, of a layer in `crs` of `map_version` (None where the layer does not say).
 
-    A shift is where the image shows the ground less where the layer has it, east and north.
+    A shift is where the image shows the ground less where the layer has it, east and north. `coordinate_epoch` is the
+    layer's, a decimal year.
     """
 
     crs: str
     map_version: int | None
     pixel_m: float
     tiles: tuple[TileRegistration, ...]
+    coordinate_epoch: float | None = None
 
     @property
     def accepted(self) -> tuple[TileRegistration, ...]:

@@ -1,6 +1,6 @@
 """One drive's observations as arrays: what the estimating cores work on, folded from its events."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -196,7 +196,8 @@ def _imu_series(rows: list[Envelope[ImuMeasured]]) -> ImuSeries:
     return ImuSeries(stamp_ns=_stamps(rows), yaw_rate_radps=_column(row.event.yaw_rate_radps for row in rows))
 
 
-def _fix_series(rows: list[Envelope[GnssFixReceived]]) -> FixSeries:
+def fix_series(rows: Sequence[Envelope[GnssFixReceived]]) -> FixSeries:
+    """Fixes in their order."""
     return FixSeries(
         stamp_ns=_stamps(rows),
         lat_deg=_column(row.event.lat_deg for row in rows),
@@ -253,6 +254,6 @@ def _drive(vehicle: str, boot_id: str, kinds: dict[type, list[Envelope[Observed]
         described=description,
         wheels=_wheel_series(rows(WheelSpeedMeasured), rows(WheelPairMeasured), description.track_m),
         imu=_imu_series(rows(ImuMeasured)),
-        fixes=_fix_series(rows(GnssFixReceived)),
+        fixes=fix_series(rows(GnssFixReceived)),
         detections=_detection_series(rows(LandmarksDetected)),
     )

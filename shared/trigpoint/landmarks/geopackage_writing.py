@@ -30,6 +30,7 @@ METADATA_TABLES = (
     CONSTRAINT crmr_mfi_fk FOREIGN KEY (md_file_id) REFERENCES gpkg_metadata(id),
     CONSTRAINT crmr_mpi_fk FOREIGN KEY (md_parent_id) REFERENCES gpkg_metadata(id))""",
 )
+ANY_METADATA = "https://www.geopackage.org/guidance/extensions/metadata.html"  # a standard: as its mime type says
 METADATA_DEFINITION = "http://www.geopackage.org/spec140/#extension_metadata"
 CRS_DEFINITION = "http://www.geopackage.org/spec140/#extension_crs_wkt"
 WGS84_SRS_ID = 4326

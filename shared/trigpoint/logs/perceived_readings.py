@@ -1,7 +1,7 @@
 """What perception found, as part of the drives it was found in: detections with their covariances, motions, loops."""
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import cast
 
@@ -13,7 +13,7 @@ from trigpoint.events.keys import STREAM_PATTERNS
 from trigpoint.events.observed import LandmarkDetection, LandmarksDetected, VehicleDescribed
 from trigpoint.events.perceived import LandmarksPerceived, LoopClosed, OdometryMatched, Perceived, PerceivedLandmark
 from trigpoint.geodesy.poses import Pose2
-from trigpoint.logs.ports import EventLog
+from trigpoint.logs.ports import EventLog, LoggedEvent
 
 PERCEIVED_STREAM = STREAM_PATTERNS[LandmarksPerceived]
 
@@ -31,28 +31,37 @@ def with_perceived(drives: Iterable[Drive], log: EventLog) -> tuple[Drive, ...]:
     """
     by_name = {(drive.vehicle, drive.boot_id): drive for drive in drives}
     told = _last_told(log, by_name.keys(), (LandmarksPerceived, OdometryMatched))
-    loops = _last_told(log, by_name.keys(), (LoopClosed,))
+    loops = closed_loops(log, by_name.keys())
     return tuple(
-        replace(_completed(drive, told.get(name, ())), loops=_loop_series(loops.get(name, ())))
+        replace(_completed(drive, _told(told, name)), loops=_loop_series(_told(loops, name)))
         for name, drive in by_name.items()
     )
 
 
+def closed_loops(log: EventLog, names: Collection[DriveName]) -> dict[DriveName, list[LoggedEvent]]:
+    """The loops of each named drive that has some, of the settings they were sought by last."""
+    return _last_told(log, names, (LoopClosed,))
+
+
 def _last_told(
     log: EventLog, names: Collection[DriveName], kinds: Sequence[type]
-) -> dict[DriveName, list[Envelope[Perceived]]]:
+) -> dict[DriveName, list[LoggedEvent]]:
     """What was told of each named drive, of some kinds of events, under the boot that told of it last."""
-    told: dict[DriveName, list[Envelope[Perceived]]] = {}
+    told: dict[DriveName, list[LoggedEvent]] = {}
     for row in log.read(PERCEIVED_STREAM, kinds=kinds):
-        envelope = cast(Envelope[Perceived], row.envelope)
-        name = (envelope.event.vehicle, envelope.event.boot_id)
+        event = cast(Perceived, row.envelope.event)
+        name = (event.vehicle, event.boot_id)
         if name not in names:
             continue
         earlier = told.setdefault(name, [])
-        if earlier and earlier[-1].identity.boot_id != envelope.identity.boot_id:
+        if earlier and earlier[-1].envelope.identity.boot_id != row.envelope.identity.boot_id:
             earlier.clear()
-        earlier.append(envelope)
+        earlier.append(row)
     return told
+
+
+def _told(told: Mapping[DriveName, Sequence[LoggedEvent]], name: DriveName) -> list[Envelope[Perceived]]:
+    return [cast(Envelope[Perceived], row.envelope) for row in told.get(name, ())]
 
 
 def _completed(drive: Drive, told: Sequence[Envelope[Perceived]]) -> Drive:

@@ -15,10 +15,12 @@ from map_http.asking import Api, asked_api, problem
 from map_http.corrections import MemoryCorrections
 from map_http.measured import FIXES, STEPS, MemoryDrives
 from map_http.sources import filled_source
+from registered_images.examples import registered, tile
 from trigpoint.errors import InputError
 from trigpoint.landmarks.model import MapChange
 from trigpoint_landmarks.http.ports import NewLabel
 from trigpoint_landmarks.http.settings import RasterSettings, WebSettings
+from trigpoint_tiles.core.check_layer import check_layer
 
 PIXEL = b"\x89PNG of the ground"
 
@@ -29,7 +31,8 @@ def api(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
     with pytest.MonkeyPatch.context() as patch, asyncio.Runner() as runner:
         source = filled_source(request, folder, patch, [anchored_version(1, tied=False), second_version()])
         settings = WebSettings(rasters=(raster(folder),))
-        with asked_api(source, runner, settings, corrections=MemoryCorrections(), drives=MemoryDrives()) as found:
+        corrections, drives, made = MemoryCorrections(), MemoryDrives(), shifts(folder)
+        with asked_api(source, runner, settings, corrections=corrections, drives=drives, shifts=made) as found:
             yield found
 
 
@@ -44,6 +47,16 @@ def raster(folder: Path) -> RasterSettings:
     (folder / "secret.png").write_bytes(b"not to be seen")
     (tiles / "3" / "7" / "5.png").symlink_to(folder / "secret.png")
     return RasterSettings(name="air", folder=tiles, bounds=(151.0, -34.0, 151.5, -33.5), images=("tile-1",), maxzoom=9)
+
+
+def shifts(folder: Path) -> Path:
+    made = folder / "shifts"
+    made.mkdir()
+    layer = check_layer(registered(tile(0, (0.3, 0.4)), tile(1, (0.0, 0.0), refused="dark")), image="north 1")
+    (made / "north 1.geojson").write_text(layer, encoding="utf-8")
+    (folder / "secret.geojson").write_text("not to be seen", encoding="utf-8")
+    (made / "secret.geojson").symlink_to(folder / "secret.geojson")
+    return made
 
 
 def label_at(x_m: float, y_m: float, **more: object) -> dict[str, object]:
@@ -259,6 +272,21 @@ def test_a_raster_that_is_nowhere_is_refused(tmp_path: Path, wrong: dict[str, An
 
 def test_a_link_does_not_lead_out_of_a_raster_s_folder(api: Api) -> None:
     assert api.get("/rasters/air/3/7/5.png").status_code == 204
+
+
+def test_registered_images_are_listed_and_their_shifts_served(api: Api) -> None:
+    (listed,) = api.told("/shifts")["shifts"]
+    assert listed == {"image": "north 1", "tiles": "/shifts/north%201"}
+    answer = api.get(listed["tiles"])
+    told, refused = answer.json()["features"]
+    assert (told["properties"]["length_m"], refused["properties"]["refused"]) == (0.5, "dark")
+    assert answer.headers["content-type"] == "application/geo+json"
+    assert api.get(listed["tiles"], headers={"If-None-Match": answer.headers["etag"]}).status_code == 304
+
+
+@pytest.mark.parametrize("image", ["south", "secret", "..%2fsecret", "north%201.geojson", "%2e%2e"])
+def test_nothing_but_registered_images_is_served(api: Api, image: str) -> None:
+    assert problem(api.get(f"/shifts/{image}"))["status"] == 404
 
 
 def test_requests_are_counted_by_the_pattern_of_their_path(api: Api) -> None:

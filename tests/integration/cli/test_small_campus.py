@@ -175,6 +175,7 @@ def test_a_landmark_is_explained_down_to_its_sweeps_in_the_log(campus: BuiltCamp
     assert {one["stream"] for one in said["observations"]["items"]} <= {"veh-vehicle-1", "veh-vehicle-2"}
     assert {one["anchor"] for one in said["anchors"]} == set(anchored[0]["anchors"])
     assert [one["event"] for one in said["corrections"]] == ["AnchorLabelled"] * len(said["anchors"])
+    assert said["loops"] == []  # without points none are closed
     assert trigpoint("explain", landmark, "--data", campus.data, "--as-of", 1).status == 0
 
 

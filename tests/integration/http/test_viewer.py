@@ -13,11 +13,13 @@ from command_runs.processes import wait_until
 from landmark_maps.examples import checkpoint, pin_frame
 from map_features.examples import anchor, two_versions
 from map_http.served import ServedMap, geopackage_line, served_map
+from registered_images.examples import registered, tile
 from trigpoint.landmarks.geopackage_store import GeoPackageStore
 from trigpoint.landmarks.model import MapChange
 from trigpoint.logs.mcap_log import McapLog
 from trigpoint_landmarks.http.tokens import Scope, issue_token
 from trigpoint_optimisation.settings import SolveSettings, settings_json
+from trigpoint_tiles.check_layer_files import write_check_layer
 from viewed_maps.browser import Viewed, chromium, viewed
 
 pytestmark = pytest.mark.browser
@@ -55,6 +57,9 @@ def map_served(tmp_path_factory: pytest.TempPathFactory, viewer_built: None) -> 
     with closing(GeoPackageStore(path)) as store:
         store.apply(solved(replace(first, anchors=(*first.anchors, anchor(MARKUP)))), checkpoint(1))
         store.apply(solved(second), checkpoint(2))
+    (folder / "data" / "shifts").mkdir()
+    tiles = registered(tile(-1, (0.3, -0.2)), tile(0, (-0.6, 0.5)), tile(1, (0.0, 0.0), refused="few edges"))
+    write_check_layer(folder / "data" / "shifts" / "north.geojson", tiles, image="north")
     tokens = folder / "tokens.json"
     _, token = issue_token(tokens, "ann", Scope.LABEL, now_s=0)
     web = f"token_file = {json.dumps(str(tokens))}\nopen_reading = true"
@@ -109,6 +114,22 @@ def test_layers_are_switched_off_and_on(page: Viewed) -> None:
     wait_until(lambda: page.pixels() != before, "another picture")
     page.page.get_by_role("checkbox", name="Optimised paths").press("Space")
     expect(page.page.get_by_role("checkbox", name="Optimised paths")).not_to_be_checked()
+
+
+def test_an_image_s_shift_is_switched_on_and_read_tile_by_tile(page: Viewed) -> None:
+    before = page.pixels()
+    page.page.get_by_role("checkbox", name="Shift of north").check()
+    page.says("2 of 3 tiles tell; map version 3")
+    wait_until(lambda: page.pixels() != before, "another picture")
+    page.tab("List")
+    page.page.get_by_label("Show", exact=True).select_option("shift")
+    page.page.get_by_role("button", name="off by 0.78 m").press("Enter")
+    details = page.page.get_by_role("region", name="Details")
+    expect(details).to_contain_text("-0.60 m grid east, 0.50 m grid north of the layer")
+    page.page.get_by_role("button", name="few edges").press("Enter")
+    expect(details).to_contain_text("refused")
+    assert page.violations() == []
+    assert page.complaints == []
 
 
 def test_every_fact_of_a_landmark_is_read_by_keyboard(page: Viewed) -> None:

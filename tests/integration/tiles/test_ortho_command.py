@@ -10,11 +10,14 @@ from click.testing import CliRunner, Result
 from rasterio.transform import from_origin
 
 from airborne_points.ign import airborne_layer
+from exported_maps.reading import read_layer
 from scanned_drives.examples import arc, drive_rows, map_rows, pinned, solved_path
 from trigpoint.logs.mcap_log import McapLog
 from trigpoint_cli.ortho import command
+from trigpoint_tiles.check_layer_files import TABLE
 
 POSES = arc(2.0)
+LAYERS = (TABLE, "test_data_rgb")  # the check layer's name in a GeoPackage and in GeoJSON
 
 
 def asked(*words: str) -> Result:
@@ -60,8 +63,19 @@ def test_igns_orthophoto_lies_on_its_airborne_points_to_a_pixel(recorded_drives:
     folder, layer = recorded_drives / "ign_lidar_hd", tmp_path / "ign.tif"
     airborne_layer(folder, layer, resolution_m=0.2)
     image = folder / "test_data_rgb.tif"
-    said = json.loads(asked("register", "--ortho", str(layer), "--image", str(image), "--json").stdout)
+    words = ("--out", str(tmp_path / "shifts.gpkg"), "--data", str(tmp_path), "--json")
+    said = json.loads(asked("register", "--ortho", str(layer), "--image", str(image), *words).stdout)
     (tile,) = said["tiles"]["items"]
     assert np.hypot(*said["shift_m"].values()) < 0.2
     assert tile["confidence"] > 0.95
     assert tile["refused"] is None
+    assert said["files"] == [str(tmp_path / "shifts.gpkg"), str(tmp_path / "shifts" / "test_data_rgb.geojson")]
+    for_gis, for_viewer = (read_layer(Path(file), name) for file, name in zip(said["files"], LAYERS, strict=True))
+    assert (for_gis.crs, for_viewer.crs) == ("EPSG:2154", "EPSG:4326")
+    assert for_gis.columns == for_viewer.columns
+
+
+def test_a_data_directory_that_is_not_there_is_named_before_anything_is_measured(tmp_path: Path) -> None:
+    missing = tmp_path / "missing"
+    found = asked("register", "--ortho", "no.tif", "--image", "no.png", "--data", str(missing))
+    assert str(found.exception).startswith(f"{missing}: no such data directory")

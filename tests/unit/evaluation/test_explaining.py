@@ -1,9 +1,11 @@
 """What stands behind a landmark: every sweep, label and correction, with its place in the log."""
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast
 
+import numpy as np
 import pytest
 
 from landmark_maps.examples import (
@@ -15,7 +17,7 @@ from landmark_maps.examples import (
     solved_landmark,
     solved_trajectory,
 )
-from solved_worlds.examples import Lap, World, world
+from solved_worlds.examples import STEP_S, Lap, World, world
 from solved_worlds.logged import append_world, drive_rows
 from trigpoint.errors import InputError
 from trigpoint.events.codec import Event
@@ -23,16 +25,19 @@ from trigpoint.events.corrected import AnchorLabelled, AnchorRetracted, DriveExc
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.mapped import LandmarkSolved
 from trigpoint.events.observed import LandmarkDetection, LandmarksDetected, VehicleDescribed
+from trigpoint.events.perceived import LoopClosed
 from trigpoint.landmarks.memory_store import MemoryStore
 from trigpoint.logs.mcap_log import McapLog
 from trigpoint.logs.memory_log import MemoryLog
 from trigpoint.logs.ports import EventLog
 from trigpoint.logs.readings import logged_maps
 from trigpoint_evaluation.core.explanation import Explanation
+from trigpoint_evaluation.core.loop_ties import LEG_NS
 from trigpoint_evaluation.explaining import explained
 from trigpoint_ingest.corrections import Attribution, exclude_drives, retract_anchor
 from trigpoint_landmarks.app import project
 from trigpoint_optimisation.app import build
+from trigpoint_optimisation.core.odometry import relative_poses
 from trigpoint_optimisation.settings import OdometrySettings, SolveSettings
 
 SETTINGS = SolveSettings(method="anchored", odometry=OdometrySettings(keyframe_m=4.0))  # coarse: quick
@@ -60,7 +65,10 @@ def block() -> World:
 def mapped(block: World) -> Mapped:
     log, store = MemoryLog(), MemoryStore()
     append_world(log, block)
+    loops = met(block)
+    log.append("perception", loops)
     build(log, SETTINGS)
+    log.append("perception", [replace(row, identity=replace(row.identity, boot_id="later")) for row in loops])
     (first,) = logged_maps(log)
     landmark = next(
         one
@@ -73,6 +81,35 @@ def mapped(block: World) -> Mapped:
     build(log, SETTINGS)
     project(log, store)
     return Mapped(log=log, store=store, landmark=landmark, anchor=anchor)
+
+
+def met(block: World) -> list[Envelope[Event]]:
+    """A loop wherever the van drives within 3 m of where the car was, looked at every two seconds."""
+    (car, van), (stamp_ns, van_ns) = block.poses, (drive.wheels.stamp_ns for drive in block.drives)
+    rows: list[Envelope[Event]] = []
+    for row in range(0, len(van), round(2.0 / STEP_S)):
+        before = int(np.argmin(np.hypot(*(car[:, :2] - van[row, :2]).T)))
+        x_m, y_m, heading_rad = relative_poses(car[[before]], van[[row]])[0].tolist()
+        event = LoopClosed(
+            vehicle="van",
+            boot_id=block.drives[1].boot_id,
+            sensor="roof",
+            sweep_sequence=row,
+            other_vehicle="car",
+            other_boot_id=block.drives[0].boot_id,
+            other_sensor="roof",
+            other_sequence=before,
+            other_stamp_ns=int(stamp_ns[before]),
+            x_m=x_m,
+            y_m=y_m,
+            heading_rad=heading_rad,
+            covariance=np.diag([0.01, 0.01, 1e-4]),
+            matched_share=0.7,
+            pairs=9,
+        )
+        if math.hypot(x_m, y_m) < 3.0:
+            rows.append(Envelope(EventIdentity("perception", "loops", len(rows)), int(van_ns[row]), event))
+    return rows
 
 
 @pytest.fixture(scope="module")
@@ -113,6 +150,28 @@ def test_a_tied_anchor_comes_with_its_residual_and_its_image_s_offset(first: Exp
     assert (tied.residual_m, tied.offset_m) == (tuple(associated.residual_m), tuple(offset.offset_m))
     logged = next(mapped.log.read(tied.position.stream, first_number=tied.position.number))
     assert logged.envelope.event == replace(associated, residual_m=logged.envelope.event.residual_m)  # type: ignore[union-attr]
+
+
+def test_loops_on_the_legs_it_was_seen_from_come_with_what_the_map_leaves_of_them(first: Explanation) -> None:
+    seen_ns = np.array([one.stamp_ns for one in first.sightings])
+    ends_ns = np.array([(one.loop.stamp_ns, one.loop.event.other_stamp_ns) for one in first.loops])
+    assert np.abs(ends_ns[:, :, None] - seen_ns).min(axis=(1, 2)).max() <= LEG_NS
+    residuals = np.array([one.residual for one in first.loops])
+    assert np.hypot(*residuals[:, :2].T).max() < 0.3  # m: loops and sightings hold both drives together
+    assert np.abs(residuals[:, 2]).max() < 0.02
+
+
+def test_a_loop_stands_in_the_log_where_it_says_and_one_that_came_later_is_not_told_of(
+    first: Explanation, mapped: Mapped
+) -> None:
+    loop = first.loops[0].loop
+    logged = next(mapped.log.read(loop.position.stream, first_number=loop.position.number))
+    assert (logged.envelope.event, logged.envelope.stamp_ns) == (loop.event, loop.stamp_ns)
+    assert logged.envelope.identity.boot_id == "loops"
+
+
+def test_a_loop_with_a_drive_that_was_left_out_is_not_behind_it(second: Explanation) -> None:
+    assert second.loops == ()
 
 
 def test_corrections_say_who_and_whether_the_version_heeded_them(first: Explanation, second: Explanation) -> None:

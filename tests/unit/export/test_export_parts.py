@@ -11,11 +11,11 @@ from trigpoint.errors import FrameRefused, InputError
 from trigpoint.geodesy.projection import crs_unit, needs_epoch
 from trigpoint.landmarks.feature_crs import CRS84
 from trigpoint.landmarks.queries import TimeSpan
+from trigpoint.landmarks.xml_text import xml_text
 from trigpoint_landmarks.export.colours import PALETTE, colour_of
 from trigpoint_landmarks.export.csv_file import cell_text
 from trigpoint_landmarks.export.placed import crs_of
 from trigpoint_landmarks.export.provenance import decimal_year, provenance_of
-from trigpoint_landmarks.export.xml_text import xml_text
 
 NS_PER_S = 1_000_000_000
 

@@ -5,29 +5,15 @@ import json
 import numpy as np
 from numpy.typing import NDArray
 
+from registered_images.examples import EAST_M, NORTH_M, SIDE_M, registered, tile
+from trigpoint.geodesy.projection import WGS84, transform_coordinates
 from trigpoint_tiles.core.check_layer import check_layer
 from trigpoint_tiles.core.consensus import contradicted
 from trigpoint_tiles.core.image_anchors import LANDMARK_SIGMA_M, PlacedLandmark, image_anchors
-from trigpoint_tiles.core.image_tiles import ImageRegistration, TileRegistration, agreeing
-from trigpoint_tiles.core.registration import Registration, unknown
+from trigpoint_tiles.core.image_tiles import TileRegistration, agreeing
+from trigpoint_tiles.core.registration import unknown
 
 Floats = NDArray[np.float64]
-
-SIDE_M, EAST_M, NORTH_M = 50.0, 333_000.0, 6_248_000.0
-
-
-def tile(number: int, shift_m: tuple[float, float], *, sigma_m: float = 0.05, refused: str = "") -> TileRegistration:
-    """The tile so many to the east."""
-    told = Registration(
-        shift_m=np.array(shift_m),
-        covariance_m2=np.diag([sigma_m**2, sigma_m**2]),
-        lean=np.zeros(2),
-        confidence=0.99,
-        refused=refused,
-    )
-    return TileRegistration(
-        easting_m=EAST_M + number * SIDE_M, northing_m=NORTH_M, width_m=SIDE_M, height_m=SIDE_M, registration=told
-    )
 
 
 def pole(name: str, east_m: float) -> PlacedLandmark:
@@ -82,8 +68,16 @@ def test_the_check_layer_says_of_each_tile_its_shift_or_why_it_has_none() -> Non
     refused = TileRegistration(
         easting_m=EAST_M, northing_m=NORTH_M, width_m=SIDE_M, height_m=SIDE_M, registration=unknown("dark")
     )
-    found = ImageRegistration(crs="EPSG:32756", map_version=3, pixel_m=0.2, tiles=(tile(1, (0.3, 0.4)), refused))
-    told, why = json.loads(check_layer(found, image="north"))["features"]
+    told, why = json.loads(check_layer(registered(tile(1, (0.3, 0.4)), refused), image="north"))["features"]
     assert (told["properties"]["shift_east_m"], told["properties"]["length_m"]) == (0.3, 0.5)
     assert (told["properties"]["image"], told["properties"]["map_version"]) == ("north", 3)
     assert (why["properties"]["refused"], why["properties"]["sigma_east_m"]) == ("dark", None)
+    assert (why["properties"]["shown_lon_deg"], why["properties"]["shown_lat_deg"]) == (None, None)
+
+
+def test_the_check_layer_says_in_degrees_where_the_image_shows_the_middle_of_a_tile() -> None:
+    (told,) = json.loads(check_layer(registered(tile(1, (0.3, 0.4))), image="north"))["features"]
+    shown = np.array([[told["properties"]["shown_lon_deg"]], [told["properties"]["shown_lat_deg"]]])
+    easting_m, northing_m = transform_coordinates(*shown, source_crs=WGS84, target_crs="EPSG:32756")
+    found_m = (easting_m[0] - EAST_M - SIDE_M, northing_m[0] - NORTH_M)
+    assert np.allclose(found_m, (0.3, 0.4), atol=0.001)  # m: degrees are rounded to 0.1 mm

@@ -16,6 +16,8 @@ import type {
   PathFeature,
   Paths,
   Raster,
+  RegisteredImage,
+  Shifts,
   Suggestions,
   Versions,
 } from "./wire.ts";
@@ -135,6 +137,14 @@ export class MapApi {
 
   async rasters(): Promise<Raster[]> {
     return (await this.told<{ rasters: Raster[] }>("rasters")).rasters;
+  }
+
+  async registeredImages(): Promise<RegisteredImage[]> {
+    return (await this.told<{ shifts: RegisteredImage[] }>("shifts")).shifts;
+  }
+
+  shifts(image: string): Promise<Shifts> {
+    return this.told(`shifts/${encodeURIComponent(image)}`);
   }
 
   async labels(): Promise<LabelInForce[]> {

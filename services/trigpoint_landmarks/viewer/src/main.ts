@@ -57,6 +57,7 @@ async function open(): Promise<void> {
   places.canvas.dataset.drawn = "true";
   await begun;
   await viewer.offerRasters();
+  await viewer.offerShifts();
 }
 
 /** Shows the map if it can be; asked again at every sign of life until it can. */

@@ -10,18 +10,26 @@ import {
   offsetArrows,
   point,
   residualArrows,
+  shiftArrows,
   suggestionRings,
 } from "./map/features.ts";
 import type { MapView } from "./map/mapView.ts";
 import type { FeatureSource } from "./map/style.ts";
 import type { Store, ViewerState } from "./state.ts";
-import { metres } from "./text.ts";
-import type { AerialImage } from "./wire.ts";
+import { counted, metres } from "./text.ts";
+import type { AerialImage, RegisteredImage, Shifts } from "./wire.ts";
 
 const ELLIPSE_LEAST_PX = 1.5; // smaller ones are under their landmark's dot
 
 function imageTitle({ image, offset_x_m: x, offset_y_m: y }: AerialImage): string {
   return x === null || y === null ? image : `${image}: off by ${metres(Math.hypot(x, y))}`;
+}
+
+/** How many of an image's tiles tell its shift, and of which map version. */
+function shiftsSaid(tiles: Shifts["features"]): string {
+  const accepted = tiles.filter((tile) => tile.properties.refused === null).length;
+  const version = tiles[0]?.properties.map_version ?? "unknown";
+  return `${accepted} of ${counted(tiles.length, "tile")} tell; map version ${version}`;
 }
 
 /** What an older service, or one without this, answers is as good as nothing. */
@@ -44,12 +52,15 @@ export class MapData {
   ) {
     store.on(["anchors", "arrowFactor", "crs"], (state) => this.drawAnchors(state));
     store.on(["images", "arrowFactor", "crs"], (state) => this.drawImages(state));
+    store.on(["shifts", "arrowFactor"], ({ shifts, arrowFactor }) => {
+      view.draw("shifts", shiftArrows(shifts, arrowFactor));
+    });
     store.on(["suggestions"], ({ suggestions }) => {
       view.draw("suggestions", suggestionRings(suggestions?.suggestions ?? []));
     });
     store.on(["selectedAt"], ({ selectedAt }) => view.draw("selected", point(selectedAt)));
     store.on(["ellipseFactor", "crs"], () => this.drawEllipses());
-    store.on(["arrowsFitted", "anchors"], () => this.fitArrows());
+    store.on(["arrowsFitted", "anchors", "shifts"], () => this.fitArrows());
     view.whenSettled(() => {
       this.fitArrows();
       this.drawEllipses();
@@ -86,6 +97,23 @@ export class MapData {
     }
   }
 
+  /** The images that were registered to the ortho layer. */
+  registeredImages(): Promise<RegisteredImage[]> {
+    return orNothing(this.api.registeredImages(), []);
+  }
+
+  /** The shift of an image against the ortho layer, or no longer; what is to be said of it. */
+  async showShifts(image: string, shown: boolean): Promise<string> {
+    const others = () => this.store.state.shifts.filter((tile) => tile.properties.image !== image);
+    if (!shown) {
+      this.store.set({ shifts: others() });
+      return "";
+    }
+    const { features } = await this.api.shifts(image);
+    this.store.set({ shifts: [...others(), ...features] });
+    return shiftsSaid(features);
+  }
+
   private drawAnchors({ anchors, crs, arrowFactor }: ViewerState): void {
     this.view.draw("anchors", anchorPoints(anchors));
     this.view.draw("residuals", residualArrows(anchors, crs, arrowFactor));
@@ -97,10 +125,13 @@ export class MapData {
   }
 
   private fitArrows(): void {
-    const { anchors, arrowsFitted } = this.store.state;
-    const residualsM = anchors.map((one) => one.properties.residual_m).filter((one) => one !== null);
-    if (arrowsFitted && residualsM.length) {
-      this.store.set({ arrowFactor: fittedFactor(residualsM, this.view.pixelM()) });
+    const { anchors, shifts, arrowsFitted } = this.store.state;
+    const lengths = [
+      ...anchors.map((one) => one.properties.residual_m),
+      ...shifts.map((one) => one.properties.length_m),
+    ].filter((one) => one !== null);
+    if (arrowsFitted && lengths.length) {
+      this.store.set({ arrowFactor: fittedFactor(lengths, this.view.pixelM()) });
     }
   }
 

@@ -1,13 +1,23 @@
 /** What the page knows, and who is told when it changes. */
 import { type Link, UNLINKED } from "./live/link.ts";
-import type { Access, AerialImage, AnchorFeature, FixFeature, LonLat, Suggestions, Versions } from "./wire.ts";
+import type {
+  Access,
+  AerialImage,
+  AnchorFeature,
+  FixFeature,
+  LonLat,
+  ShiftFeature,
+  Suggestions,
+  Versions,
+} from "./wire.ts";
 
 /** What is looked at more closely. */
 export type Selection =
   | { what: "landmark"; id: string }
   | { what: "anchor"; id: string }
   | { what: "fix"; id: string }
-  | { what: "image"; id: string };
+  | { what: "image"; id: string }
+  | { what: "shift"; id: string };
 
 export interface ViewerState {
   link: Link;
@@ -20,6 +30,8 @@ export interface ViewerState {
   anchors: readonly AnchorFeature[];
   images: readonly AerialImage[];
   fixes: readonly FixFeature[];
+  /** The tiles of registered images that are shown. */
+  shifts: readonly ShiftFeature[];
   suggestions: Suggestions | null;
   selection: Selection | null;
   /** Where the selected thing is. */
@@ -43,6 +55,7 @@ export const BEGINNING: ViewerState = {
   anchors: [],
   images: [],
   fixes: [],
+  shifts: [],
   suggestions: null,
   selection: null,
   selectedAt: null,

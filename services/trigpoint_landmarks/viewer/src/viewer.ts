@@ -27,6 +27,7 @@ const SELECTED_BY: Partial<Record<Pointed["layer"], Selection["what"]>> = {
   landmarks: "landmark",
   suggestions: "landmark",
   fixes: "fix",
+  shifts: "shift",
   "footprints-fill": "image",
 };
 
@@ -70,6 +71,11 @@ export class Viewer {
     this.layers.offerRasters(rasters);
   }
 
+  /** The images that were registered to the ortho layer, to be shown beside the map. */
+  async offerShifts(): Promise<void> {
+    this.layers.offerShifts(await this.data.registeredImages(), (image, shown) => this.data.showShifts(image, shown));
+  }
+
   /** Shows the newest version, and what is under way to the next. */
   async begin(): Promise<void> {
     await this.refresh();
@@ -110,9 +116,10 @@ export class Viewer {
     if (this.store.state.following) this.showVersion(newest, true);
   }
 
-  private async showGroup(group: string, shown: boolean): Promise<void> {
+  private async showGroup(group: string, shown: boolean): Promise<string> {
     this.view.show(group, shown);
     if (shown) await this.data.showDriven(group);
+    return "";
   }
 
   private offerSuggestions(list: ListPanel): void {

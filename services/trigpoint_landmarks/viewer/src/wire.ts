@@ -161,6 +161,30 @@ export interface Raster {
   attribution: string;
 }
 
+/** An image whose shift against the ortho layer was measured. */
+export interface RegisteredImage {
+  image: string;
+  tiles: string;
+}
+
+/** A tile's shift: where the image shows the ground, less where the layer has it; null of a refused one. */
+export interface ShiftProperties {
+  image: string;
+  map_version: number | null;
+  shift_east_m: number | null;
+  shift_north_m: number | null;
+  sigma_east_m: number | null;
+  sigma_north_m: number | null;
+  length_m: number | null;
+  shown_lon_deg: number | null;
+  shown_lat_deg: number | null;
+  confidence: number;
+  refused: string | null;
+}
+
+export type ShiftFeature = Feature<Point, ShiftProperties>;
+export type Shifts = FeatureCollection<Point, ShiftProperties>;
+
 export interface Access {
   name: string;
   scope: string | null;

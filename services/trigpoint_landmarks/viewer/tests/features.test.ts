@@ -1,9 +1,9 @@
 import type { MultiLineString, Polygon } from "geojson";
 import { describe, expect, it } from "vitest";
-import { distanceM, SIGMAS_95 } from "../src/geo.ts";
+import { distanceM, moved, SIGMAS_95 } from "../src/geo.ts";
 import { fittedFactor } from "../src/map/exaggeration.ts";
-import { ellipses, prospect, residualArrows, suggestionRings } from "../src/map/features.ts";
-import type { AnchorFeature, Association, LonLat, Suggestion } from "../src/wire.ts";
+import { ellipses, prospect, residualArrows, shiftArrows, suggestionRings } from "../src/map/features.ts";
+import type { AnchorFeature, Association, LonLat, ShiftFeature, Suggestion } from "../src/wire.ts";
 
 const SYDNEY: LonLat = [151.19, -33.89];
 const ASSOCIATION: Association = {
@@ -65,6 +65,29 @@ describe("a label that might be", () => {
   it("shows the nearest landmark that is refused as what it is", () => {
     const refused = { ...ASSOCIATION, landmark: "" };
     expect(prospect(SYDNEY, refused).features.map((one) => one.properties.part)).toEqual(["gate", "rival"]);
+  });
+});
+
+function tile(shown: LonLat | null): ShiftFeature {
+  const [lon, lat] = shown ?? [null, null];
+  const properties = { image: "north", shown_lon_deg: lon, shown_lat_deg: lat, length_m: shown ? 0.5 : null };
+  return {
+    type: "Feature",
+    geometry: { type: "Point", coordinates: SYDNEY },
+    properties: properties as ShiftFeature["properties"],
+  };
+}
+
+describe("an image's shift", () => {
+  it("is an arrow to where the image shows the tile's middle, as many times as long as asked for", () => {
+    const shown = moved(SYDNEY, 0.3, 0.4);
+    const [, arrow] = shiftArrows([tile(shown)], 10).features.map(({ geometry }) => geometry as MultiLineString);
+    const tip = arrow?.coordinates[0]?.[1] as LonLat;
+    expect(distanceM(tip, moved(SYDNEY, 3, 4))).toBeLessThan(0.001);
+  });
+
+  it("that was refused is a point alone", () => {
+    expect(shiftArrows([tile(null)], 10).features.map(({ geometry }) => geometry.type)).toEqual(["Point"]);
   });
 });
 

@@ -6,10 +6,11 @@ import {
   type Ellipse,
   ellipseRing,
   gridConvergenceRad,
+  metresBetween,
   SIGMAS_95,
   trueFromGrid,
 } from "../geo.ts";
-import type { AerialImage, AnchorFeature, Association, LonLat, Suggestion } from "../wire.ts";
+import type { AerialImage, AnchorFeature, Association, LonLat, ShiftFeature, Suggestion } from "../wire.ts";
 
 export type Drawn = FeatureCollection<Geometry, Record<string, unknown>>;
 
@@ -86,6 +87,26 @@ export function offsetArrows(images: readonly AerialImage[], crs: string, factor
       const at = centre(ring);
       const vector = trueFromGrid([x * factor, y * factor], gridConvergenceRad(crs, at));
       return [drawn({ type: "MultiLineString", coordinates: arrowLines(at, vector) })];
+    }),
+  );
+}
+
+/** The name of a tile among all that are shown. */
+export function shiftId({ properties, geometry }: ShiftFeature): string {
+  return `${properties.image} at ${geometry.coordinates.join(" ")}`;
+}
+
+/** The tiles' middles, and from each that tells an arrow to where the image shows it, `factor` times as long as it is. */
+export function shiftArrows(tiles: readonly ShiftFeature[], factor: number): Drawn {
+  return collected(
+    tiles.flatMap((tile) => {
+      const { shown_lon_deg: lon, shown_lat_deg: lat, length_m } = tile.properties;
+      const at = tile.geometry.coordinates as LonLat;
+      const middle = drawn(tile.geometry, { id: shiftId(tile), length_m });
+      if (lon === null || lat === null) return [middle];
+      const [eastM, northM] = metresBetween(at, [lon, lat]);
+      const lines = arrowLines(at, [eastM * factor, northM * factor]);
+      return [middle, drawn({ type: "MultiLineString", coordinates: lines }, { length_m })];
     }),
   );
 }

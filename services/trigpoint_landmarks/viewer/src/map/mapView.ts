@@ -23,7 +23,7 @@ import { dataLayers, type FeatureSource, rasterSource, styleOf, TILE_SOURCES } f
 const REACH_PX = 8; // from what is pointed at
 const CLOSE_ZOOM = 20;
 const AROUND_PX = { top: 32, left: 32, right: 56, bottom: 120 }; // the controls' room
-const POINTED = ["anchors", "suggestions", "landmarks", "fixes", "footprints-fill"] as const;
+const POINTED = ["anchors", "suggestions", "landmarks", "fixes", "shifts", "footprints-fill"] as const;
 
 /** Something on the map, by its layer and id. */
 export interface Pointed {

@@ -15,6 +15,10 @@ const NAMES = [
   "footprint",
   "suggestion",
   "selected",
+  "good",
+  "fair",
+  "bad",
+  "muted",
 ] as const;
 
 export type Palette = Record<(typeof NAMES)[number], string>;

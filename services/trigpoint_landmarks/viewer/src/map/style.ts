@@ -14,6 +14,7 @@ export const FEATURE_SOURCES = [
   "fixes",
   "footprints",
   "offsets",
+  "shifts",
   "suggestions",
   "selected",
   "prospect",
@@ -22,6 +23,8 @@ export type FeatureSource = (typeof FEATURE_SOURCES)[number];
 
 export const TILE_SOURCES = ["landmarks", "trajectories"] as const;
 const DEEPEST_ZOOM = 22;
+/** Up to which a shift is small, and over which it is large: a pixel of aerial images, and what is seen unmeasured. */
+export const SHIFT_LIMITS_M = [0.2, 0.5] as const;
 const FONT = ["sans-serif"];
 
 const WIDER = ["interpolate", ["linear"], ["zoom"], 14, 1.4, 20, 3];
@@ -101,6 +104,38 @@ function anchorLayers(colours: Palette): LayerSpecification[] {
   ];
 }
 
+/** A tile's colour by its shift's length; one without was refused. */
+function ofLength(colours: Palette): unknown {
+  const [small, large] = SHIFT_LIMITS_M;
+  const length = ["get", "length_m"];
+  const told = ["case", ["<=", length, small], colours.good, ["<=", length, large], colours.fair, colours.bad];
+  return ["case", ["==", length, null], colours.muted, told];
+}
+
+function shiftLayers(colours: Palette): LayerSpecification[] {
+  const refused = ["==", ["get", "length_m"], null];
+  const dot = {
+    "circle-color": ["case", refused, colours.ground, ofLength(colours)],
+    "circle-radius": 3.5,
+    "circle-stroke-color": ["case", refused, colours.muted, colours.halo],
+    "circle-stroke-width": ["case", refused, 2, 1],
+  };
+  return [
+    line(
+      "shift-arrows",
+      "shifts",
+      colours.bad,
+      { "line-color": ofLength(colours), "line-width": 2 },
+      ofType("LineString"),
+    ),
+    layer("circle", "shifts", "shifts", dot, ofType("Point")),
+  ];
+}
+
+function ofType(type: string): Record<string, unknown> {
+  return { filter: ["==", ["geometry-type"], type] };
+}
+
 function suggestionLayers(colours: Palette): LayerSpecification[] {
   const ring = {
     "circle-radius": ["get", "radius"],
@@ -157,6 +192,7 @@ export function dataLayers(colours: Palette): LayerSpecification[] {
     ...footprintLayers(colours),
     ...pathLayers(colours),
     ...landmarkLayers(colours),
+    ...shiftLayers(colours),
     ...anchorLayers(colours),
     ...suggestionLayers(colours),
     ...pointedAtLayers(colours),

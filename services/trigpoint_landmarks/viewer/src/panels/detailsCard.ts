@@ -2,9 +2,10 @@
 import { type MapApi, said } from "../api.ts";
 import { button, type Child, el, facts, fill } from "../dom.ts";
 import { SIGMAS_95 } from "../geo.ts";
+import { shiftId } from "../map/features.ts";
 import type { Selection, Store } from "../state.ts";
-import { degrees, metres, moment } from "../text.ts";
-import type { AerialImage, AnchorFeature, FixFeature, LandmarkFeature, LonLat } from "../wire.ts";
+import { degrees, metres, moment, percent } from "../text.ts";
+import type { AerialImage, AnchorFeature, FixFeature, LandmarkFeature, LonLat, ShiftFeature } from "../wire.ts";
 
 const DEGREES = 180 / Math.PI;
 
@@ -46,7 +47,7 @@ export class DetailsCard {
   }
 
   private async content(selection: Selection): Promise<Child[]> {
-    const { anchors, fixes, images, shown } = this.store.state;
+    const { anchors, fixes, images, shifts, shown } = this.store.state;
     switch (selection.what) {
       case "landmark":
         return this.ofLandmark(await this.api.landmark(selection.id, shown));
@@ -56,6 +57,8 @@ export class DetailsCard {
         return this.ofFix(fixes.find((one) => one.id === selection.id));
       case "image":
         return this.ofImage(images.find((one) => one.image === selection.id));
+      case "shift":
+        return this.ofShift(shifts.find((one) => shiftId(one) === selection.id));
     }
   }
 
@@ -170,6 +173,25 @@ export class DetailsCard {
         ["Stated sigma", properties.sigma_m === null ? null : metres(properties.sigma_m)],
         ["Vehicle", `${properties.vehicle}, boot ${properties.boot_id}`],
         ["Taken", moment(properties.stamp_ns)],
+      ]),
+    ];
+  }
+
+  private ofShift(tile: ShiftFeature | undefined): Child[] {
+    if (!tile) return [...this.head("Shift", ""), el("p", {}, "It is not shown any more.")];
+    const { image, refused, confidence, map_version: version, shift_east_m: x, shift_north_m: y } = tile.properties;
+    const { sigma_east_m: sigmaX, sigma_north_m: sigmaY } = tile.properties;
+    const position = tile.geometry.coordinates as LonLat;
+    this.store.set({ selectedAt: position });
+    return [
+      ...this.head(`Shift of ${image}`, refused === null ? "measured" : "refused"),
+      facts([
+        ["Why", refused],
+        ["Image shows the ground", x === null ? null : `${metres(x)} grid east, ${metres(y)} grid north of the layer`],
+        ["Its 1-sigma", sigmaX === null ? null : `${metres(sigmaX)} east, ${metres(sigmaY)} north`],
+        ["Confidence", percent(confidence)],
+        ["Ortho layer", version === null ? null : `of map version ${version}`],
+        ["Tile's middle", degrees(position)],
       ]),
     ];
   }

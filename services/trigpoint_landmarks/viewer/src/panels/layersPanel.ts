@@ -3,8 +3,9 @@ import licence from "../../node_modules/maplibre-gl/LICENSE.txt?url";
 import { said } from "../api.ts";
 import { el, fill } from "../dom.ts";
 import { LAYER_GROUPS, type LayerGroup, type Swatch } from "../map/layerGroups.ts";
+import { SHIFT_LIMITS_M } from "../map/style.ts";
 import type { Store } from "../state.ts";
-import type { Raster } from "../wire.ts";
+import type { Raster, RegisteredImage } from "../wire.ts";
 import { arrowChoice, factorChoice } from "./factorChoice.ts";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -40,25 +41,41 @@ interface Entry {
   shown: boolean;
 }
 
+/** Shows something or hides it; what is to be said of it, if anything. */
+type Show = (shown: boolean) => Promise<string>;
+
 /** Whose work draws the map, with its licence, which has to come along. */
 function credit(): HTMLElement {
   const link = el("a", { href: licence, target: "_blank", rel: "noopener" }, "MapLibre GL JS");
   return el("p", { class: "credit" }, "Drawn with ", link, ".");
 }
 
+/** What the colours of shifts mean. */
+function shiftColours(): HTMLElement {
+  const [small, large] = SHIFT_LIMITS_M;
+  const named = [
+    ["good", `to ${small} m`],
+    ["fair", `to ${large} m`],
+    ["bad", "more"],
+    ["muted", "refused"],
+  ] as const;
+  return el("p", { class: "kinds" }, ...named.map(([colour, text]) => el("span", {}, swatch("dot", colour), text)));
+}
+
 export class LayersPanel {
   readonly element: HTMLElement;
   private readonly boxes = new Map<string, HTMLInputElement>();
   private readonly rasters = el("div", {});
+  private readonly shifts = el("div", {});
 
   constructor(
     store: Store,
-    private readonly show: (group: string, shown: boolean) => Promise<void>,
+    private readonly show: (group: string, shown: boolean) => Promise<string>,
   ) {
     const rows = LAYER_GROUPS.map((group) =>
       this.row(group, swatch(group.swatch, group.colour), this.below(group, store)),
     );
-    this.element = el("div", { class: "layers" }, el("h2", {}, "Layers"), this.rasters, ...rows, credit());
+    this.element = el("div", { class: "layers" }, el("h2", {}, "Layers"), this.rasters, ...rows, this.shifts, credit());
   }
 
   /** Shows or hides a group, and says so in its box. */
@@ -80,7 +97,22 @@ export class LayersPanel {
     );
   }
 
-  private row(entry: Entry, mark: SVGElement, below: HTMLElement | null): HTMLElement {
+  /** A row for each image whose shift against the ortho layer was measured, none shown yet. */
+  offerShifts(images: readonly RegisteredImage[], show: (image: string, shown: boolean) => Promise<string>): void {
+    const rows = images.map(({ image }, index) => {
+      const hint = "from where the ortho layer has the ground to where the image shows it";
+      const entry = { id: `shift-${index}`, title: `Shift of ${image}`, hint, shown: false };
+      return this.row(entry, swatch("arrow", "fair"), null, (shown) => show(image, shown));
+    });
+    fill(this.shifts, ...rows, images.length ? shiftColours() : null);
+  }
+
+  private row(
+    entry: Entry,
+    mark: SVGElement,
+    below: HTMLElement | null,
+    show: Show = (shown) => this.show(entry.id, shown),
+  ): HTMLElement {
     const id = `layer-${entry.id}`;
     const names = { "aria-labelledby": `${id}-title`, "aria-describedby": entry.hint ? `${id}-hint` : null };
     const box = el("input", { type: "checkbox", id, ...names });
@@ -90,8 +122,7 @@ export class LayersPanel {
       state.className = "";
       state.textContent = box.checked ? "loading…" : "";
       try {
-        await this.show(entry.id, box.checked);
-        state.textContent = "";
+        state.textContent = await show(box.checked);
       } catch (error) {
         state.className = "trouble";
         state.textContent = `not there: ${said(error)}`;

@@ -3,6 +3,7 @@ import type { Feature, Geometry } from "geojson";
 import { type MapApi, said } from "../api.ts";
 import { button, el, fill, options } from "../dom.ts";
 import { SIGMAS_95 } from "../geo.ts";
+import { shiftId } from "../map/features.ts";
 import type { MapView } from "../map/mapView.ts";
 import type { Selection, Store } from "../state.ts";
 import { counted, metres, moment } from "../text.ts";
@@ -22,6 +23,7 @@ const CHOICES = [
   ["anchor", "Anchors"],
   ["fix", "Rejected fixes"],
   ["image", "Aerial images"],
+  ["shift", "Shifts of images shown"],
 ] as const;
 
 function placeOf(feature: Feature<Geometry | null>): LonLat | null {
@@ -60,7 +62,7 @@ export class ListPanel {
       this.count,
       this.list,
     );
-    store.on(["anchors", "fixes", "images"], () => this.open && void this.load());
+    store.on(["anchors", "fixes", "images", "shifts"], () => this.open && void this.load());
     view.map.on("moveend", () => this.open && this.what.value === "landmark" && void this.load());
   }
 
@@ -84,7 +86,7 @@ export class ListPanel {
   }
 
   private async found(what: string): Promise<Row[]> {
-    const { anchors, fixes, images, shown } = this.store.state;
+    const { anchors, fixes, images, shifts, shown } = this.store.state;
     switch (what) {
       case "anchor":
         return anchors.map((one) => ({
@@ -108,6 +110,13 @@ export class ListPanel {
           about: counted(one.anchor_count, "anchor"),
           selection: { what: "image", id: one.image },
           position: (one.footprint?.coordinates[0]?.[0] as LonLat | undefined) ?? null,
+        }));
+      case "shift":
+        return shifts.map((one) => ({
+          title: one.properties.image,
+          about: one.properties.refused ?? `off by ${metres(one.properties.length_m)}`,
+          selection: { what: "shift", id: shiftId(one) },
+          position: placeOf(one),
         }));
       default:
         return this.landmarks(shown);

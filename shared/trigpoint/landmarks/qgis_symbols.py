@@ -1,15 +1,37 @@
-"""Symbols as QGIS 3 keeps them in XML, with only what differs from its defaults."""
+"""Symbols and styles as QGIS 3 keeps them in XML, with only what differs from its defaults."""
 
 from collections.abc import Mapping, Sequence
 from typing import Literal
-from xml.etree.ElementTree import Element, SubElement
+from xml.etree.ElementTree import Element, SubElement, tostring
 
-from trigpoint_landmarks.export.xml_text import xml_text
+from trigpoint.landmarks.xml_text import xml_text
 
 SymbolKind = Literal["marker", "line", "fill"]
+QGIS_VERSION = "3.22"
+DOCTYPE = "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n"
+RENDERED = {"symbollevels": "0", "enableorderby": "0", "forceraster": "0", "referencescale": "-1"}
 BY_EXPRESSION = "3"  # QGIS' number of a property that an expression gives
 
 Colour = tuple[int, int, int]
+
+
+def style_text(renderer: Element) -> str:
+    """A layer's style as QML."""
+    root = Element("qgis", {"version": QGIS_VERSION, "styleCategories": "Symbology"})
+    root.append(renderer)
+    return DOCTYPE + tostring(root, encoding="unicode")
+
+
+def categorized(expression: str, categories: Sequence[tuple[str, str, Element]]) -> Element:
+    """A renderer of categories, each with a value of the expression (a column, or more), a label, and its symbol named
+    by its number; the value "" stands for all others."""
+    element = Element("renderer-v2", {"type": "categorizedSymbol", "attr": expression, **RENDERED})
+    listed, symbols = SubElement(element, "categories"), SubElement(element, "symbols")
+    for number, (value, label, drawn) in enumerate(categories):
+        said = {"symbol": str(number), "value": value, "label": label, "render": "true"}
+        SubElement(listed, "category", said)
+        symbols.append(drawn)
+    return element
 
 
 def symbol(kind: SymbolKind, name: str, layers: Sequence[Element]) -> Element:

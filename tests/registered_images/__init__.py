@@ -1,0 +1,1 @@
+"""Aerial images registered to an ortho layer by hand."""
