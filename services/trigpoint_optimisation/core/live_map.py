@@ -276,7 +276,8 @@ class LiveMap:
                 self._conflicts += 1
 
     def _sight_of(self, seen: Sequence[Seen]) -> Sight:
-        return sight_of(seen, self._settings.detections.shared_share)
+        offset_m = self._settings.calibration.range_offset_m
+        return sight_of(seen, shared_share=self._settings.detections.shared_share, offset_m=offset_m)
 
     def _sight(self, drive: DriveInMap, leg: Leg, track: Track) -> None:
         """Everything seen of a track up to a keyframe becomes sightings of its landmark, one a keyframe."""

@@ -12,12 +12,11 @@ def hang_sight(
     graph: IncrementalGraph, drive: DriveInMap, keyframe: int, track: int, *, sight: Sight, common_sigma_m: float
 ) -> None:
     """A sight of a track's landmark; where the track's sights share an error, of the pass's own point of it, which
-    is off the landmark by that error. Others have `common_sigma_m` of what all detections of a keyframe share."""
-    landmark = drive.of[track]
-    if sight.shared_m2 == 0.0:
-        noise = sight.covariance + common_sigma_m**2 * np.eye(2)
-        graph.add_sighting(drive.index, keyframe, landmark_key(landmark), sight.point_m, noise)
-        return
-    if track not in drive.own:
-        drive.own[track] = graph.add_pass_point(landmark, sight.shared_m2)
-    graph.add_sighting(drive.index, keyframe, drive.own[track], sight.point_m, sight.covariance)
+    is off the landmark by that error. `common_sigma_m` is of what no state here stands for, as the sensor's delay."""
+    key = landmark_key(drive.of[track])
+    if sight.shared_m2 > 0.0:
+        if track not in drive.own:
+            drive.own[track] = graph.add_pass_point(drive.of[track], sight.shared_m2)
+        key = drive.own[track]
+    noise = sight.covariance + common_sigma_m**2 * np.eye(2)
+    graph.add_sighting(drive.index, keyframe, key, sight.point_m, noise)

@@ -174,15 +174,16 @@ def usable(track: Track, first_keyframe: int, keyframe: int) -> list[Seen]:
     return [each for each in track.fresh(keyframe) if each.keyframe >= first_keyframe]
 
 
-def sight_of(seen: Sequence[Seen], shared_share: float) -> Sight:
+def sight_of(seen: Sequence[Seen], *, shared_share: float, offset_m: float) -> Sight:
     """Detections of a track from one keyframe as one sight.
 
     Where the sensor tells covariances their mean is no surer than one of them, and `shared_share` of its variance is
-    one error of the whole track, as in a whole solve (`sightings.drive_sightings`); else detections are independent.
+    one error of the whole track, as in a whole solve (`sightings.drive_sightings`); `offset_m`, 1-sigma, by which all
+    a drive's things may seem too near, is part of that error. Else detections are independent.
     """
     point_m: Floats = np.mean([each.point_m for each in seen], axis=0)
     mean: Floats = np.mean([each.covariance for each in seen], axis=0)
     if not any(each.told for each in seen):
         return Sight(point_m=point_m, covariance=mean / len(seen), shared_m2=0.0)
-    shared_m2 = shared_share * 0.5 * float(np.trace(mean))
+    shared_m2 = shared_share * 0.5 * float(np.trace(mean)) + offset_m**2
     return Sight(point_m=point_m, covariance=(1.0 - shared_share) * mean, shared_m2=shared_m2)
