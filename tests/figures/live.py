@@ -153,6 +153,18 @@ FIGURES = (
         partial(of_perceived, value=lambda found: found.update_p99_ms),
     ),
     figure(
+        "lidar, no detections: sweeps that came after their leg was whole",
+        "1",
+        None,
+        partial(of_perceived, value=lambda found: found.late_share),
+    ),
+    figure(
+        "lidar, no detections: sweeps that wait for the next whole solve",
+        "1",
+        None,
+        partial(of_perceived, value=lambda found: found.passed_over_share),
+    ),
+    figure(
         "lidar, no detections: landmarks in the growing map",
         "1",
         None,
