@@ -121,7 +121,10 @@ class LiveOptimisation:
     def _catch_up(self) -> bool:
         """Whether something waited that was taken in before."""
         assert self._fleet is not None, "begun before"
+        began_s = time.perf_counter()
         waited, places = self._fleet.catch_up()
+        if waited:
+            self._instruments.update_seconds.observe(time.perf_counter() - began_s)
         self._correct(places)
         return waited
 
@@ -147,7 +150,9 @@ class LiveOptimisation:
         self._judged = StreamFollower(
             self._log, [VERDICT_STREAM], checkpoint={VERDICT_STREAM: state.verdict_number}, kinds=(FixJudged,)
         )
-        self._perceived = PerceivedLandmarks(self._log, first_number=state.perceived_number)
+        self._perceived = PerceivedLandmarks(
+            self._log, first_number=state.perceived_number, updated=self._instruments.update_seconds.observe
+        )
         self._corrected = StreamFollower(
             self._log, [LABEL_STREAM], checkpoint={LABEL_STREAM: self._log.next_number(LABEL_STREAM)}
         )
@@ -180,6 +185,8 @@ class LiveOptimisation:
                 places[place.vehicle, place.boot_id] = place
                 self._instruments.update_seconds.observe(time.perf_counter() - began_s)
                 began_s = time.perf_counter()
+        for (vehicle, outcome), sweeps in self._fleet.take_late().items():
+            self._instruments.late_sweeps.labels(vehicle, outcome).inc(sweeps)
         verdicts = self._judged.take(BATCH)
         for row in verdicts:
             self._fleet.judged(cast(FixJudged, row.envelope.event))

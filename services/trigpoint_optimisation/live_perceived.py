@@ -1,14 +1,14 @@
 """What perception found in the sweeps of the drives under way, as it comes into the log."""
 
+import time
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import cast
 
-from trigpoint.events.envelope import Envelope, EventIdentity
-from trigpoint.events.observed import LandmarksDetected
+from trigpoint.events.envelope import Envelope
 from trigpoint.events.perceived import LandmarksPerceived
 from trigpoint.logs.following import StreamFollower
-from trigpoint.logs.perceived_readings import PERCEIVED_STREAM, detected_in
+from trigpoint.logs.perceived_readings import PERCEIVED_STREAM
 from trigpoint.logs.ports import EventLog
 from trigpoint_optimisation.core.live_fleet import LiveFleet
 from trigpoint_optimisation.core.live_state import DriveName, DrivePlace
@@ -23,10 +23,14 @@ Perceived = Envelope[LandmarksPerceived]
 class PerceivedLandmarks:
     """Follows perception's stream and gives each sweep to its drive as one of its landmark sensor.
 
-    Of a drive that was perceived by several settings, the first heard of counts.
+    Of a drive that was perceived by several settings, the first heard of counts. `updated` is told the seconds of each
+    update of the map.
     """
 
-    def __init__(self, log: EventLog, *, first_number: int) -> None:
+    def __init__(
+        self, log: EventLog, *, first_number: int, updated: Callable[[float], None] = lambda seconds: None
+    ) -> None:
+        self._updated = updated
         self._follower = StreamFollower(
             log, [PERCEIVED_STREAM], checkpoint={PERCEIVED_STREAM: first_number}, kinds=(LandmarksPerceived,)
         )
@@ -61,14 +65,14 @@ class PerceivedLandmarks:
         places: list[DrivePlace] = []
         for row in rows:
             name, told_as = _drive_of(row), row.identity.boot_id
-            described = fleet.described(name)
-            if described is None:
+            if fleet.described(name) is None:
                 self._unknown.append(row)
             elif self._told_as.setdefault(name, told_as) == told_as:
-                identity = EventIdentity(*name, row.event.sweep_sequence)
-                detected: Envelope[LandmarksDetected]
-                detected = Envelope(identity, row.stamp_ns, detected_in(row.event, described))
-                places += fleet.perceive(detected)
+                began_s = time.perf_counter()
+                found = fleet.perceive(row)
+                if found:
+                    self._updated(time.perf_counter() - began_s)
+                places += found
         return places
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from figures.figure import Bounds, Figure, Measurement, at_most
 from figures.workbench import Workbench
 from live_runs.campus_drives import Placed, UpdateTimes, update_times, without_receiver
+from live_runs.late_perception import PerceivedUpdateTimes, perceived_update_times
 from live_runs.perceiving import PerceivedLive, perceived_live
 from live_runs.visibility import Visible, visible_within
 
@@ -14,6 +15,7 @@ VEHICLES, POSES, SEED = 5, 10_000, 1
 SECONDS = 60.0
 PERCEIVED_SECONDS = 130.0  # the receiver needs a hundred of them to tell a heading
 UPDATES = f"live_runs.campus_drives.update_times(vehicles={VEHICLES}, poses={POSES}, seed={SEED})"
+LATE = f"live_runs.late_perception.perceived_update_times(vehicles={VEHICLES}, poses={POSES}, seed={SEED})"
 VISIBLE = f"live_runs.visibility.visible_within(seconds={SECONDS:g}, seed={SEED})"
 PERCEIVED = f"live_runs.perceiving.perceived_live(seconds={PERCEIVED_SECONDS:g}, seed={SEED})"
 PLACED = f"live_runs.campus_drives.without_receiver(seed={SEED})"
@@ -23,6 +25,12 @@ PLACED = f"live_runs.campus_drives.without_receiver(seed={SEED})"
 def updates() -> UpdateTimes:
     """The campus driven by enough vehicles for the map to have so many poses."""
     return update_times(vehicles=VEHICLES, poses=POSES, seed=SEED)
+
+
+@cache
+def perceived_updates() -> PerceivedUpdateTimes:
+    """The same, of what perception says, some of it late."""
+    return perceived_update_times(vehicles=VEHICLES, poses=POSES, seed=SEED)
 
 
 @cache
@@ -46,6 +54,11 @@ def placed() -> Placed:
 def of_updates(bench: Workbench, *, value: Callable[[UpdateTimes], float]) -> Measurement:
     """A number of the update times."""
     return Measurement(value=value(updates()), command=UPDATES)
+
+
+def of_perceived_updates(bench: Workbench, *, value: Callable[[PerceivedUpdateTimes], float]) -> Measurement:
+    """A number of the update times with perception."""
+    return Measurement(value=value(perceived_updates()), command=LATE)
 
 
 def of_visible(bench: Workbench, *, value: Callable[[Visible], float]) -> Measurement:
@@ -79,6 +92,36 @@ FIGURES = (
         "the same, the processor's time", "ms", None, partial(of_updates, value=lambda found: found.p99_processor_ms)
     ),
     figure(
+        "the same of landmarks perceived, some late",
+        "ms",
+        at_most(100.0),
+        partial(of_perceived_updates, value=lambda found: found.p99_ms),
+    ),
+    figure(
+        "landmarks perceived, some late: the processor's time",
+        "ms",
+        None,
+        partial(of_perceived_updates, value=lambda found: found.p99_processor_ms),
+    ),
+    figure(
+        "landmarks perceived, some late: updates while perception catches up",
+        "ms",
+        None,
+        partial(of_perceived_updates, value=lambda found: found.late_p99_ms),
+    ),
+    figure(
+        "landmarks perceived, some late: sweeps that came after their leg was whole",
+        "1",
+        None,
+        partial(of_perceived_updates, value=lambda found: found.late_share),
+    ),
+    figure(
+        "landmarks perceived, some late: sweeps that wait for the next whole solve",
+        "1",
+        None,
+        partial(of_perceived_updates, value=lambda found: found.passed_over_share),
+    ),
+    figure(
         "from a sweep in the log to its landmark in the database, p95",
         "s",
         at_most(2.0),
@@ -108,6 +151,18 @@ FIGURES = (
         "ms",
         at_most(100.0),
         partial(of_perceived, value=lambda found: found.update_p99_ms),
+    ),
+    figure(
+        "lidar, no detections: sweeps that came after their leg was whole",
+        "1",
+        None,
+        partial(of_perceived, value=lambda found: found.late_share),
+    ),
+    figure(
+        "lidar, no detections: sweeps that wait for the next whole solve",
+        "1",
+        None,
+        partial(of_perceived, value=lambda found: found.passed_over_share),
     ),
     figure(
         "lidar, no detections: landmarks in the growing map",

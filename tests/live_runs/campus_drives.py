@@ -79,7 +79,7 @@ def update_times(*, vehicles: int, poses: int, seed: int = 1) -> UpdateTimes:
     would be done: after as much time of the drive as it took.
     """
     campus = simulate_campus(seed, CampusSettings(vehicles=vehicles))
-    solving = _Solving(campus, SolveSettings())
+    solving = WholeSolves(campus, SolveSettings())
     fleet = LiveFleet(campus.frame, SolveSettings())
     wall, processor = [], []
     most = 0  # poses of the growing graph
@@ -108,7 +108,7 @@ def update_times(*, vehicles: int, poses: int, seed: int = 1) -> UpdateTimes:
     )
 
 
-class _Solving:
+class WholeSolves:
     """Whole solves as the service asks for them, each taken in when it would be done."""
 
     def __init__(self, campus: Campus, settings: SolveSettings) -> None:

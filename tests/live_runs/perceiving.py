@@ -26,6 +26,7 @@ from trigpoint.logs.mcap_log import McapLog
 from trigpoint.observability.metrics import Instruments
 from trigpoint.observability.running import Service
 from trigpoint_optimisation.app import STREAM as MAP_STREAM
+from trigpoint_optimisation.core.live_fleet import HUNG, PASSED_OVER
 from trigpoint_optimisation.live import LiveOptimisation
 from trigpoint_optimisation.whole_solve import SolverInPlace
 from trigpoint_perception.app import STREAM
@@ -44,7 +45,8 @@ Rows = Sequence[Envelope[Observed]]
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PerceivedLive:
     """How long after a sweep was in the log its landmarks were (95th percentile, most), what one took to perceive on
-    average, the 99th percentile of the map's updates meanwhile, its landmarks, and the median of their errors."""
+    average, the 99th percentile of the map's updates meanwhile, its landmarks, and the median of their errors; which
+    part of the sweeps came after their leg was whole, and which was passed over."""
 
     said_p95_s: float
     said_most_s: float
@@ -52,6 +54,8 @@ class PerceivedLive:
     update_p99_ms: float
     landmarks: int
     off_m: float
+    late_share: float
+    passed_over_share: float
 
 
 @dataclass(slots=True)
@@ -73,9 +77,10 @@ def perceived_live(folder: Path, *, seconds: float, seed: int = 1) -> PerceivedL
     rows, heard = _measured(scanned, seconds), _Heard()
     with closing(McapLog(folder / "log")) as log:
         _begin(log, scanned.campus, rows)
-        with _at_work(log, heard):
+        with _at_work(log, heard) as counted:
             _append_in_time(log, rows, heard)
         landmarks = [row.envelope.event for row in log.read(MAP_STREAM, kinds=(LandmarkSolved,))]
+    late = _late_sweeps(counted, rows[0].identity.source)
     newest = {event.landmark: event for event in landmarks if isinstance(event, LandmarkSolved)}
     late_s = [said_s - heard.appended_s[sweep] for sweep, said_s in heard.said_s.items()][WARM_UP_SWEEPS:]
     return PerceivedLive(
@@ -85,7 +90,16 @@ def perceived_live(folder: Path, *, seconds: float, seed: int = 1) -> PerceivedL
         update_p99_ms=1e3 * float(np.percentile(heard.durations["update"], 99)),
         landmarks=len(newest),
         off_m=_off_m(scanned, list(newest.values())),
+        late_share=(late[HUNG] + late[PASSED_OVER]) / len(heard.said_s),
+        passed_over_share=late[PASSED_OVER] / len(heard.said_s),
     )
+
+
+def _late_sweeps(counted: Instruments, vehicle: str) -> dict[str, float]:
+    """How many sweeps were perceived late, by outcome."""
+    of = counted.registry.get_sample_value
+    name = "trigpoint_late_sweeps_total"
+    return {one: of(name, {"vehicle": vehicle, "outcome": one}) or 0.0 for one in (HUNG, PASSED_OVER)}
 
 
 def _measured(scanned: ScannedCampus, seconds: float) -> Rows:
@@ -111,21 +125,22 @@ def _begin(log: McapLog, campus: Campus, rows: Rows) -> None:
 
 
 @contextmanager
-def _at_work(log: McapLog, heard: _Heard) -> Iterator[None]:
-    """Perception and optimisation, each in a thread of its own."""
+def _at_work(log: McapLog, heard: _Heard) -> Iterator[Instruments]:
+    """Perception and optimisation, each in a thread of its own; what the latter counts."""
+    counted = Instruments("optimisation", heard=heard)
     perceiving = LivePerception(log, MemoryBus(), instruments=Instruments("perception", heard=heard))
     optimising = LiveOptimisation(
         log,
         SolverInPlace(log, NO_WHOLE_SOLVES),
         settings=NO_WHOLE_SOLVES,
-        instruments=Instruments("optimisation", heard=heard),
+        instruments=counted,
     )
     stop, services = threading.Event(), cast(list[Service], [perceiving, optimising])
     threads = [threading.Thread(target=one.run, args=(stop,)) for one in services]
     for thread in threads:
         thread.start()
     try:
-        yield
+        yield counted
     finally:
         stop.set()
         for thread, service in zip(threads, services, strict=True):

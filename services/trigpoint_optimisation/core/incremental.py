@@ -37,11 +37,16 @@ def antenna_point_key(drive: int, keyframe: int) -> int:
     return int(gtsam.symbol("p", drive * 10**7 + keyframe))
 
 
+def pass_point_key(number: int) -> int:
+    """Where one pass sees a landmark: Point2."""
+    return int(gtsam.symbol("t", number))
+
+
 def _thresholds() -> gtsam.ISAM2ThresholdMap:
     """How much an estimate may move, by the letter of its key."""
     thresholds = gtsam.ISAM2ThresholdMap()
     thresholds.insert(("x", np.array([RELINEARISE_M, RELINEARISE_M, RELINEARISE_RAD])))
-    for letter in "ldpg":
+    for letter in "ldpgt":
         thresholds.insert((letter, np.full(2, RELINEARISE_M)))
     return thresholds
 
@@ -60,7 +65,7 @@ class IncrementalGraph:
         parameters.relinearizeSkip = RELINEARISE_EVERY
         self._solver = gtsam.ISAM2(parameters)
         self._factors, self._guesses = gtsam.NonlinearFactorGraph(), gtsam.Values()
-        self.pose_count = 0
+        self.pose_count = self._pass_points = 0
 
     def add_solved_landmarks(self, point_m: Floats, covariance_m2: Floats) -> None:
         """Landmarks 0 … l - 1 as a solve left them, (l, 2) with covariances (l, 2, 2), and an error in common."""
@@ -96,15 +101,25 @@ class IncrementalGraph:
         """A landmark that was not there yet, about here (2,); its sightings hold it."""
         self._guesses.insert(landmark_key(landmark), point_m)
 
-    def add_sighting(self, drive: int, keyframe: int, landmark: int, point_m: Floats, covariance: Floats) -> None:
-        """A landmark at a point (2,) of the keyframe's frame, not nearer than 0.2 m, with covariance (2, 2)."""
+    def add_pass_point(self, landmark: int, shared_m2: float) -> int:
+        """A point of one pass's own, off its landmark by the error that the pass's sightings share, of this variance
+        per axis; its key."""
+        key = pass_point_key(self._pass_points)
+        self._pass_points += 1
+        shared = gtsam.noiseModel.Isotropic.Variance(2, shared_m2)
+        self._factors.add(gtsam.BetweenFactorPoint2(landmark_key(landmark), key, np.zeros(2), shared))
+        self._guesses.insert(key, self.point(landmark))
+        return key
+
+    def add_sighting(self, drive: int, keyframe: int, key: int, point_m: Floats, covariance: Floats) -> None:
+        """A landmark, or a pass's point of it, by its key, at a point (2,) of the keyframe's frame, not nearer than
+        0.2 m, with covariance (2, 2)."""
         x, y = point_m.tolist()
         range_m = math.hypot(x, y)
         polar = np.array([[-y / range_m**2, x / range_m**2], [x / range_m, y / range_m]])
         noise = _gaussian(polar @ covariance @ polar.T)
         bearing = gtsam.Rot2(math.atan2(y, x))
-        keys = pose_key(drive, keyframe), landmark_key(landmark)
-        self._factors.add(gtsam.BearingRangeFactor2D(*keys, bearing, range_m, noise))
+        self._factors.add(gtsam.BearingRangeFactor2D(pose_key(drive, keyframe), key, bearing, range_m, noise))
 
     def add_fix_error(self, drive: int, knot: int, *, sigma_m: float, decay: float) -> None:
         """The slow error of a drive's fixes from a knot on, Gauss-Markov: stationary `sigma_m`, `decay` per knot."""

@@ -18,65 +18,35 @@ from trigpoint.events.observed import (
     WheelPairMeasured,
     WheelSpeedMeasured,
 )
-from trigpoint.geodesy.poses import transform_points
+from trigpoint.events.perceived import LandmarksPerceived
 from trigpoint_optimisation.core.graph import turn_sigmas
-from trigpoint_optimisation.core.known_landmark_slam import BEARING_SIGMA_RAD, LN_RANGE_SIGMA
 from trigpoint_optimisation.core.live_calibration import Calibrating, Calibration, Motion
-from trigpoint_optimisation.core.live_tracks import OpenTracks, Sweep, Track
+from trigpoint_optimisation.core.live_leg import HungFix, Leg
+from trigpoint_optimisation.core.live_past import LateLeg, PastLegs, offset_at
+from trigpoint_optimisation.core.live_sweeps import Hook, SweepReading
+from trigpoint_optimisation.core.live_tracks import OpenTracks, Track
 from trigpoint_optimisation.core.odometry import (
-    DeadReckonedPath,
     Motions,
     OdometryCalibration,
     TurnSource,
     keyframe_motions,
-    relative_poses,
     turn_source,
 )
 from trigpoint_optimisation.core.preparation import odometry_noise
-from trigpoint_optimisation.core.single_sightings import VEHICLE
 from trigpoint_optimisation.core.trajectory import composed
 from trigpoint_optimisation.settings import CalibrationPriors, SolveSettings
 
 Floats = NDArray[np.float64]
+Heard = GnssFixReceived | LandmarksDetected | LandmarksPerceived
+Event = Observed | LandmarksPerceived
 
-PERCEIVED_WAIT_NS = 3_000_000_000  # behind the newest measurement what perception finds is not waited for longer
+PERCEIVED_WAIT_NS = 3_000_000_000  # behind the newest measurement legs do not wait longer for what perception finds
 AHEAD_NS = 10_000_000_000  # of the newest measurement: what was perceived so far on is of another clock,
 AHEAD_SWEEPS = 500  # and more of it than this is not kept
 REORDER_NS = 200_000_000  # an event may arrive this much behind a later one and still be taken in order
 STANDING_NS = 1_000_000_000  # a standing vehicle has a keyframe after so long,
 STANDING_KEYFRAMES = 3  # and so many in a row: what it sees again and again says nothing new
 STILL_M = 1e-3  # per keyframe
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HungFix:
-    """A fix: the base's pose (3,) at its time in its keyframe's frame."""
-
-    sequence: int
-    stamp_ns: int
-    lat_deg: float
-    lon_deg: float
-    T_keyframe_base: Floats
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Leg:
-    """What one drive did from keyframe `keyframe` to the next, and what it saw on the way, hung on the first.
-
-    T_odom_start and T_odom_end (3,): by nominal dead reckoning; `delta` (3,) and `covariance` (3, 3) by the
-    calibration learned so far.
-    """
-
-    keyframe: int
-    start_ns: int
-    end_ns: int
-    T_odom_start: Floats
-    T_odom_end: Floats
-    delta: Floats
-    covariance: Floats
-    path_m: float
-    tracks: tuple[Track, ...]
-    fixes: tuple[HungFix, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,13 +67,14 @@ class LiveDrive:
         self.described, self.boot_id = described, boot_id
         self.tracks = OpenTracks(settings.detections)
         self._settings, self._scale = settings, point_scale
-        self._waiting: list[tuple[int, int, Observed]] = []
-        self._newest_ns = self._perceived_ns = self._released_ns = -1
-        self._perceived: list[tuple[int, int, Observed]] = []
+        self._waiting: list[tuple[int, int, Event]] = []
+        self._newest_ns = self._perceived_ns = self._released_ns = self._own_ns = -1
+        self._perceived: list[tuple[int, int, Event]] = []
         self.passed_over = 0  # perceived sweeps that came too late or too early
+        self._past = PastLegs()
         self._wheels: list[_Wheel] = []
         self._imu: list[tuple[int, float]] = []
-        self._heard: list[tuple[int, int, GnssFixReceived | LandmarksDetected]] = []
+        self._heard: list[tuple[int, int, Heard]] = []
         self._due_ns = -1
         self._progress = 0.0
         self._standing = 0
@@ -116,23 +87,57 @@ class LiveDrive:
         event = row.event
         if isinstance(event, LandmarksDetected) and self._perceived_ns >= 0:  # both saw the same things
             event = LandmarksDetected(detections=tuple(one for one in event.detections if one.signature))
+        elif isinstance(event, LandmarksDetected):
+            self._own_ns = max(self._own_ns, row.stamp_ns)
         heapq.heappush(self._waiting, (row.stamp_ns, row.identity.sequence, event))
         self._newest_ns = max(self._newest_ns, row.stamp_ns)
         return self._released()
 
-    def perceive(self, row: Envelope[LandmarksDetected]) -> list[Leg]:
+    def perceive(self, row: Envelope[LandmarksPerceived]) -> list[Leg]:
         """The same, of what was perceived in one more sweep, each once: from the first on, measurements wait for it.
 
-        What the vehicle itself detected without a signature then stands back; a camera does not.
+        What the vehicle itself detected without a signature then stands back; a camera does not. What comes after its
+        leg was whole is hung on that leg: see `seen_late`.
         """
         if self.described.landmark_sensor_model == CAMERA:
             return []
         self._perceived_ns = max(self._perceived_ns, row.stamp_ns)
-        if row.stamp_ns <= self._released_ns or len(self._perceived) == AHEAD_SWEEPS:
+        if row.stamp_ns <= self._released_ns:
+            self._take_late(row)
+        elif len(self._perceived) == AHEAD_SWEEPS:
             self.passed_over += 1
         else:
-            heapq.heappush(self._perceived, (row.stamp_ns, row.identity.sequence, row.event))
+            self._past.leave()
+            heapq.heappush(self._perceived, (row.stamp_ns, row.event.sweep_sequence, row.event))
         return self._released()
+
+    def seen_late(self) -> list[LateLeg]:
+        """The legs, whole before, of which more was seen since this was asked last."""
+        return self._past.take_seen()
+
+    def _take_late(self, row: Envelope[LandmarksPerceived]) -> None:
+        """A sweep hung where it belongs, in the leg under way or one that is whole, unless that is too long ago or has
+        what the vehicle itself detected there."""
+        stamp_ns, sequence = row.stamp_ns, row.event.sweep_sequence
+        if stamp_ns <= self._own_ns:
+            self.passed_over += 1
+        elif self._wheels and stamp_ns >= self._wheels[0].stamp_ns:
+            self._past.leave()
+            self._heard.append((stamp_ns, sequence, row.event))
+            self._heard.sort(key=lambda heard: heard[:2])
+        elif (found := self._past.at(stamp_ns)) is not None:
+            leg, T_keyframe_base = found
+            hook = Hook(
+                stamp_ns=stamp_ns,
+                sequence=sequence,
+                keyframe=leg.keyframe,
+                T_odom_keyframe=leg.T_odom_start,
+                T_keyframe_base=T_keyframe_base,
+            )
+            leg.tracks.update({track.number: track for track in self.tracks.take(self._reading.sweep(row.event, hook))})
+            self._past.see(leg)
+        else:
+            self.passed_over += 1
 
     @property
     def ahead(self) -> int:
@@ -153,18 +158,22 @@ class LiveDrive:
         return legs
 
     @property
+    def _reading(self) -> SweepReading:
+        return SweepReading(described=self.described, settings=self._settings.detections, point_scale=self._scale)
+
+    @property
     def calibration(self) -> Calibration | None:
         """What was learned of the odometry so far, None before the first leg."""
         return self._calibrating.calibration if self._calibrating else None
 
-    def _after(self, stamp_ns: int, sequence: int, event: Observed) -> list[Leg]:
+    def _after(self, stamp_ns: int, sequence: int, event: Event) -> list[Leg]:
         legs = []
         moves = isinstance(event, WheelSpeedMeasured | WheelPairMeasured | ImuMeasured)
         if moves and 0 <= self._due_ns < stamp_ns:
             legs.append(self._closed(stamp_ns if isinstance(event, ImuMeasured) else None, event))
         if isinstance(event, ImuMeasured):
             self._imu.append((stamp_ns, event.yaw_rate_radps))
-        elif isinstance(event, GnssFixReceived | LandmarksDetected):
+        elif isinstance(event, GnssFixReceived | LandmarksDetected | LandmarksPerceived):
             if self._wheels:
                 self._heard.append((stamp_ns, sequence, event))
         elif isinstance(event, VehicleDescribed):
@@ -204,7 +213,7 @@ class LiveDrive:
             return wheel.speed_mps * math.tan(max(min(wheel.steering_rad, 1.2), -1.2)) / self.described.wheelbase_m
         return wheel.yaw_rate_radps if math.isfinite(wheel.yaw_rate_radps) else 0.0
 
-    def _closed(self, imu_ns: int | None, event: Observed) -> Leg:
+    def _closed(self, imu_ns: int | None, event: Event) -> Leg:
         """The leg up to the keyframe that is due; the samples after it begin the next."""
         imu = list(self._imu)
         if imu_ns is not None and isinstance(event, ImuMeasured):
@@ -255,7 +264,7 @@ class LiveDrive:
         self._T_odom_base = composed(start[None, :], motion.delta[None, :])[0]
         self._path_m += float(np.hypot(*motion.delta[:2]))
         self._keyframe += 1
-        return Leg(
+        leg = Leg(
             keyframe=keyframe,
             start_ns=int(stamp_ns[0]),
             end_ns=int(stamp_ns[1]),
@@ -264,9 +273,11 @@ class LiveDrive:
             delta=motion.at(calibration.off),
             covariance=calibration.noise_of(motion, dt_s=dt_s),
             path_m=self._path_m,
-            tracks=tuple(tracks),
+            tracks={track.number: track for track in tracks},
             fixes=tuple(fixes),
         )
+        self._past.add(leg, motions.path)
+        return leg
 
     def _calibrated(self, motion: Motion, tracks: list[Track], source: TurnSource, *, dt_s: float) -> Calibration:
         """What is known of the odometry after one more motion."""
@@ -293,7 +304,7 @@ class LiveDrive:
         for stamp_ns, sequence, event in self._heard:
             if stamp_ns >= self._due_ns:
                 continue
-            offset = _offset(motions.path, stamp_ns)
+            offset = offset_at(motions.path, stamp_ns)
             if isinstance(event, GnssFixReceived):
                 fixes.append(
                     HungFix(
@@ -305,40 +316,15 @@ class LiveDrive:
                     )
                 )
             else:
-                sweep = self._sweep(event, offset, stamp_ns=stamp_ns, sequence=sequence)
-                seen |= {track.number: track for track in self.tracks.take(sweep)}
+                hook = Hook(
+                    stamp_ns=stamp_ns,
+                    sequence=sequence,
+                    keyframe=self._keyframe,
+                    T_odom_keyframe=self._T_odom_base,
+                    T_keyframe_base=offset,
+                )
+                seen |= {track.number: track for track in self.tracks.take(self._reading.sweep(event, hook))}
         return [seen[number] for number in sorted(seen)], fixes
-
-    def _sweep(self, event: LandmarksDetected, offset: Floats, *, stamp_ns: int, sequence: int) -> Sweep:
-        most_m = self._settings.detections.max_range_m
-        rows = [row for row, each in enumerate(event.detections) if each.kind != VEHICLE and each.range_m <= most_m]
-        found = [event.detections[row] for row in rows]
-        range_m = np.array([each.range_m for each in found])
-        bearing = np.array([each.bearing_rad for each in found]) + self.described.landmark_sensor_yaw_rad
-        mount = np.array([self.described.landmark_sensor_x_m, self.described.landmark_sensor_y_m])
-        ray = range_m[:, None] * np.column_stack([np.cos(bearing), np.sin(bearing)])
-        point_m = transform_points(offset, self._scale * (mount + ray))
-        return Sweep(
-            stamp_ns=stamp_ns,
-            sequence=sequence,
-            keyframe=self._keyframe,
-            row=tuple(rows),
-            point_odom_m=transform_points(self._T_odom_base, point_m),
-            point_m=point_m,
-            covariance=self._covariances(range_m, bearing + offset[2]),
-            kind=tuple(each.kind for each in found),
-            signature=tuple(each.signature for each in found),
-        )
-
-    def _covariances(self, range_m: Floats, angle_rad: Floats) -> Floats:
-        """Covariances (d, 2, 2) of seen points in the keyframe's frame."""
-        camera, detections = self.described.landmark_sensor_model == CAMERA, self._settings.detections
-        along = (LN_RANGE_SIGMA * range_m) ** 2 if camera else np.full(len(range_m), detections.range_sigma_m**2)
-        across = (range_m * (BEARING_SIGMA_RAD if camera else detections.bearing_sigma_rad)) ** 2
-        c, s = np.cos(angle_rad), np.sin(angle_rad)
-        xy = (along - across) * c * s
-        rows = [along * c * c + across * s * s, xy, xy, along * s * s + across * c * c]
-        return np.stack(rows, axis=-1).reshape(-1, 2, 2)
 
 
 def nominal(stamp_ns: int) -> OdometryCalibration:
@@ -362,10 +348,3 @@ def seen_points(tracks: list[Track], keyframe: int) -> dict[int, Floats]:
     """Where each track was seen from a keyframe (2,), by track number, averaged."""
     by_track = {track.number: [each.point_m for each in track.seen if each.keyframe == keyframe] for track in tracks}
     return {number: np.mean(points, axis=0) for number, points in by_track.items() if points}
-
-
-def _offset(path: DeadReckonedPath, stamp_ns: int) -> Floats:
-    """The base's pose (3,) at a stamp in the frame of the path's first keyframe."""
-    at = path.at(np.array([path.stamp_ns[0], stamp_ns]))
-    offset: Floats = relative_poses(at[:1], at[1:])[0]
-    return offset

@@ -1,6 +1,6 @@
 """The drives that are under way and the map they grow: a fold over their events, begun anew from each whole solve."""
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from trigpoint.events.envelope import Envelope
 from trigpoint.events.estimated import FixJudged
 from trigpoint.events.mapped import LandmarkSolved, OdometryCorrected, TrajectorySolved
-from trigpoint.events.observed import LandmarksDetected, Observed, VehicleDescribed
+from trigpoint.events.observed import Observed, VehicleDescribed
+from trigpoint.events.perceived import LandmarksPerceived
 from trigpoint.geodesy.poses import wrap_angle_rad
 from trigpoint.geodesy.projection import MapFrame
-from trigpoint_optimisation.core.live_drive import Leg, LiveDrive
+from trigpoint_optimisation.core.live_drive import LiveDrive
+from trigpoint_optimisation.core.live_leg import Leg
 from trigpoint_optimisation.core.live_map import WAITING_M, LiveMap
 from trigpoint_optimisation.core.live_placing import Placed, map_from_odom
 from trigpoint_optimisation.core.live_state import DriveName, DrivePlace
@@ -23,6 +25,7 @@ from trigpoint_optimisation.settings import SolveSettings
 Floats = NDArray[np.float64]
 
 LEGS_MOST = 3  # led into the map in one update: hundreds wait once it begins anew
+HUNG, PASSED_OVER = "hung on its leg", "passed over"  # what becomes of a sweep perceived late
 LOOSENED = 4.0  # of a start's covariance: what it shares with the landmarks is not to be counted twice
 
 
@@ -73,6 +76,7 @@ class LiveFleet:
         self._followed: dict[DriveName, _Followed] = {}
         self._accepted: dict[DriveName, set[int]] = {}  # fixes, by the filter
         self._starts = dict(starts or {})
+        self._late: Counter[tuple[str, str]] = Counter()
         self.excluded = frozenset(excluded)
         self.map = LiveMap(frame, settings, base=base)
 
@@ -92,11 +96,27 @@ class LiveFleet:
                 followed.legs = _still_needed(followed.legs, None)
         return places
 
-    def perceive(self, row: Envelope[LandmarksDetected]) -> list[DrivePlace]:
+    def perceive(self, row: Envelope[LandmarksPerceived]) -> list[DrivePlace]:
         """The same as `take`, of what was perceived in a sweep of a drive that has begun."""
-        name = (row.identity.source, row.identity.boot_id)
+        name = (row.event.vehicle, row.event.boot_id)
         followed = self._followed[name]
-        return self._led(name, followed, followed.drive.perceive(row))
+        passed_over = followed.drive.passed_over
+        places = self._led(name, followed, followed.drive.perceive(row))
+        self._late[name[0], PASSED_OVER] += followed.drive.passed_over - passed_over
+        for late in followed.drive.seen_late():
+            self._late[name[0], HUNG if self._look_again(name, followed, late.leg) else PASSED_OVER] += late.sweeps
+        return places
+
+    def _look_again(self, name: DriveName, followed: _Followed, leg: Leg) -> bool:
+        """Whether a leg of which more was seen comes into the map, or is there and looked at again."""
+        comes = bool(followed.behind) and leg.keyframe >= followed.behind[0].keyframe
+        return comes or self.map.look_again(name, leg)
+
+    def take_late(self) -> Mapping[tuple[str, str], int]:
+        """How many sweeps were perceived after their legs were whole, by vehicle and outcome, since this was asked
+        last."""
+        late, self._late = self._late, Counter()
+        return +late
 
     def described(self, name: DriveName) -> VehicleDescribed | None:
         """What a drive's vehicle is; None before its first event."""
@@ -143,8 +163,8 @@ class LiveFleet:
             followed.start = starts.get(name)
             followed.legs = _still_needed(followed.legs, followed.start)
             followed.behind = deque(followed.legs)
-            for track in (track for leg in followed.legs for track in leg.tracks):
-                track.used = 0
+            for track in (track for leg in followed.legs for track in leg.tracks.values()):
+                track.begin_anew()
 
     def _begun(self, name: DriveName, event: Observed) -> _Followed:
         described = event if isinstance(event, VehicleDescribed) else VehicleDescribed(vehicle=name[0])

@@ -9,23 +9,20 @@ from numpy.typing import NDArray
 from trigpoint.events.mapped import LandmarkSolved
 from trigpoint.events.observed import VehicleDescribed
 from trigpoint.geodesy.poses import transform_points
-from trigpoint.geodesy.projection import MapFrame, map_points_from_wgs84
+from trigpoint.geodesy.projection import MapFrame
 from trigpoint_optimisation.core.constellation import Constellation
 from trigpoint_optimisation.core.graph import MIN_RANGE_M
 from trigpoint_optimisation.core.incremental import IncrementalGraph
 from trigpoint_optimisation.core.live_association import Candidate, answer, candidate, chi_square
-from trigpoint_optimisation.core.live_drive import HungFix, Leg
+from trigpoint_optimisation.core.live_fixes import hang_fix, local_fix
 from trigpoint_optimisation.core.live_landmarks import LiveLandmark, LiveLandmarks, detected_name
-from trigpoint_optimisation.core.live_placing import (
-    LocalFix,
-    Placed,
-    map_from_odom,
-    placed_by_fixes,
-)
+from trigpoint_optimisation.core.live_leg import HungFix, Leg
+from trigpoint_optimisation.core.live_placing import Placed, map_from_odom, placed_by_fixes
+from trigpoint_optimisation.core.live_sights import hang_sight
 from trigpoint_optimisation.core.live_state import DriveInMap, DriveName, DrivePlace, into_frame
-from trigpoint_optimisation.core.live_tracks import Track, mean_seen, seen_at, usable
+from trigpoint_optimisation.core.live_tracks import Seen, Sight, Track, sight_of, usable
 from trigpoint_optimisation.core.merging import joint_shift_pairs
-from trigpoint_optimisation.settings import HONEST_EDGES, SolveSettings
+from trigpoint_optimisation.settings import SolveSettings
 
 Floats = NDArray[np.float64]
 
@@ -41,9 +38,6 @@ FOLLOWED_SIGMA_M = 0.15  # between a vehicle and a landmark it has in sight
 DISAGREEMENT = 25.0  # chi-square of a sighting that is not of its landmark
 UNJUDGED_MOST = 1000  # fixes that wait for their verdict, or were rejected
 STRIKES = 3  # such sightings in a row, and the track is no more of it
-FIX_SPACING_NS = 2_000_000_000  # between fixes in the graph
-FIX_KNOT_NS = 30_000_000_000  # the slow error of fixes is held for so long,
-FIX_DECAY = float(np.exp(-30.0 / HONEST_EDGES.bias_time_s))  # and decays from one to the next by this
 FIX_SIGMA_M = 3.0  # of a fix, slow and white part together, where a drive is placed by them
 NIS_KEPT, NIS_ENOUGH = 300, 100
 NIS_LIMIT = 2.0 * 2.0  # mean of chi-square, 2 degrees of freedom, twice
@@ -113,6 +107,22 @@ class LiveMap:
         self._look_on(drive)
         return [self.place(name)] if drive.placed else []
 
+    def look_again(self, name: DriveName, leg: Leg) -> bool:
+        """Whether a leg of which more was seen since it was taken is in the graph, or may still come there: then that
+        is looked at too."""
+        drive = self._drives.get(name)
+        if drive is None:
+            return False
+        if not drive.placed:
+            kept = bool(drive.waiting) and leg.keyframe >= drive.waiting[0].keyframe
+            drive.pending |= leg.tracks if kept else {}
+            return kept
+        if leg.keyframe < drive.first_keyframe:
+            return False
+        if all(each.keyframe != leg.keyframe for each in drive.unseen):
+            drive.unseen.append(leg)
+        return True
+
     @property
     def told_count(self) -> int:
         """How many landmarks were told of."""
@@ -178,7 +188,7 @@ class LiveMap:
             return
         drive.waiting.append(leg)
         drive.waiting = [each for each in drive.waiting if each.path_m > leg.path_m - WAITING_M]
-        drive.pending |= {track.number: track for track in leg.tracks}
+        drive.pending |= leg.tracks
         oldest = drive.waiting[0].keyframe
         drive.pending = {n: track for n, track in drive.pending.items() if track.last_keyframe >= oldest}
         placed = self._place_of(drive)
@@ -204,7 +214,7 @@ class LiveMap:
         for leg in legs:
             self._move(drive, leg)
         for fix in [fix for fix in drive.fixes.values() if fix.keyframe >= placed.keyframe]:
-            self._add_fix(drive, fix, legs[fix.keyframe - placed.keyframe].start_ns)
+            hang_fix(self._graph, drive, fix, legs[fix.keyframe - placed.keyframe].start_ns)
         drive.fixes.clear()
         drive.pending.clear()
         self._graph.update()
@@ -215,79 +225,71 @@ class LiveMap:
         drive.unseen.append(leg)
 
     def _take_fix(self, drive: DriveInMap, keyframe: int, fix: HungFix) -> None:
-        fix_m = map_points_from_wgs84(np.array([fix.lat_deg]), np.array([fix.lon_deg]), self._frame)[0]
-        if not np.isfinite(fix_m).all():
+        local = local_fix(fix, drive.described, self._frame, keyframe=keyframe)
+        if local is None:
             return
-        arm = self._frame.point_scale * np.array([drive.described.antenna_x_m, drive.described.antenna_y_m])
-        local = LocalFix(keyframe=keyframe, fix_m=fix_m, antenna_m=transform_points(fix.T_keyframe_base, arm))
         if not drive.placed:
             drive.fixes[fix.sequence] = local
         elif keyframe >= drive.first_keyframe and drive.newest is not None and keyframe <= drive.newest.keyframe:
-            self._add_fix(drive, local, fix.stamp_ns)
-
-    def _add_fix(self, drive: DriveInMap, fix: LocalFix, stamp_ns: int) -> None:
-        if fix.keyframe <= drive.last_fix_keyframe or stamp_ns < drive.last_fix_ns + FIX_SPACING_NS:
-            return
-        drive.last_fix_keyframe, drive.last_fix_ns = fix.keyframe, stamp_ns
-        if drive.knot < 0 or stamp_ns >= drive.knot_ns + FIX_KNOT_NS:
-            drive.knot, drive.knot_ns = drive.knot + 1, stamp_ns
-            sigma_m = HONEST_EDGES.bias_sigma_m
-            self._graph.add_fix_error(drive.index, drive.knot, sigma_m=sigma_m, decay=FIX_DECAY)
-        self._graph.add_fix(
-            drive.index,
-            fix.keyframe,
-            drive.knot,
-            fix.fix_m,
-            antenna_m=fix.antenna_m,
-            fixes=HONEST_EDGES,
-        )
+            hang_fix(self._graph, drive, local, fix.stamp_ns)
 
     def _look(self, drive: DriveInMap, leg: Leg) -> None:
         """What was seen from a keyframe goes into the graph, as far as it is known what it is."""
-        known = [track for track in leg.tracks if track.number in drive.of]
+        tracks = [leg.tracks[number] for number in sorted(leg.tracks)]
+        if not tracks:
+            return
+        known = [track for track in tracks if track.number in drive.of]
         self._check(drive, leg, known)
         for track in known:
             if track.number in drive.of:
                 self._sight(drive, leg, track)
         least = self._settings.detections.min_detections
         fresh = [
-            track for track in leg.tracks if track.number not in drive.of and (track.count >= least or track.signature)
+            track for track in tracks if track.number not in drive.of and (track.count >= least or track.signature)
         ]
         self._associate(drive, leg, fresh)
         self._vote(drive, leg)
 
     def _check(self, drive: DriveInMap, leg: Leg, known: Sequence[Track]) -> None:
         """Tracks whose sightings contradict their landmark again and again leave it; single ones are left out."""
-        seen = {track.number: found for track in known if (found := seen_at(track, leg.keyframe)) is not None}
+        seen = {
+            track.number: self._sight_of(here)
+            for track in known
+            if (here := [each for each in track.fresh(leg.keyframe) if each.keyframe == leg.keyframe])
+        }
         if not seen:
             return
         pose = self._graph.pose(drive.index, leg.keyframe)
         for track in [track for track in known if track.number in seen]:
-            point_m, noise = seen[track.number]
+            sight = seen[track.number]
             expected = into_frame(pose, self._graph.point(drive.of[track.number]))
-            off = chi_square(point_m - expected, noise + FOLLOWED_SIGMA_M**2 * np.eye(2))
+            off = chi_square(sight.point_m - expected, sight.whole_covariance + FOLLOWED_SIGMA_M**2 * np.eye(2))
             self._nis.append(min(off, DISAGREEMENT))
             if off <= DISAGREEMENT:
                 drive.strikes.pop(track.number, None)
                 continue
-            track.used += len(track.fresh(leg.keyframe))
+            track.use(leg.keyframe)
             drive.strikes[track.number] = drive.strikes.get(track.number, 0) + 1
             if drive.strikes[track.number] >= STRIKES:
                 del drive.of[track.number], drive.strikes[track.number]
+                drive.own.pop(track.number, None)
                 self._conflicts += 1
+
+    def _sight_of(self, seen: Sequence[Seen]) -> Sight:
+        offset_m = self._settings.calibration.range_offset_m
+        return sight_of(seen, shared_share=self._settings.detections.shared_share, offset_m=offset_m)
 
     def _sight(self, drive: DriveInMap, leg: Leg, track: Track) -> None:
         """Everything seen of a track up to a keyframe becomes sightings of its landmark, one a keyframe."""
-        number, fresh, taken = drive.of[track.number], track.fresh(leg.keyframe), []
-        track.used += len(fresh)
+        number, fresh, taken = drive.of[track.number], track.use(leg.keyframe), []
         for keyframe in sorted({each.keyframe for each in fresh if each.keyframe >= drive.first_keyframe}):
             seen = [each for each in fresh if each.keyframe == keyframe]
-            point_m, covariance = mean_seen(seen)
-            if np.hypot(*point_m) <= MIN_RANGE_M:
+            sight = self._sight_of(seen)
+            if np.hypot(*sight.point_m) <= MIN_RANGE_M:
                 continue
             taken += seen
-            noise = covariance + self._settings.detections.common_sigma_m**2 * np.eye(2)
-            self._graph.add_sighting(drive.index, keyframe, number, point_m, noise)
+            common_m = self._settings.detections.common_sigma_m
+            hang_sight(self._graph, drive, keyframe, track.number, sight=sight, common_sigma_m=common_m)
         if taken:
             vehicle = drive.described.vehicle
             self.landmarks[number].take(track, taken, vehicle=vehicle, boot_id=drive.boot_id)
@@ -317,14 +319,20 @@ class LiveMap:
         expected is asked for all of them at once: that takes as long as for one."""
         pose, seen, near = self._graph.pose(drive.index, keyframe), {}, {}
         for track in tracks:
-            seen[track.number] = point_m, _ = mean_seen([each for each in track.seen if each.keyframe == keyframe])
-            near[track.number] = self._near(drive, track, transform_points(pose, point_m))
+            seen[track.number] = sight = self._sight_of([each for each in track.seen if each.keyframe == keyframe])
+            near[track.number] = self._near(drive, track, transform_points(pose, sight.point_m))
         asked = sorted({landmark for found in near.values() for landmark in found})
         expected, covariance = self._graph.seen_from(drive.index, keyframe, asked)
         row = {landmark: number for number, landmark in enumerate(asked)}
         found = {
             number: [
-                candidate(n, seen[number][0], expected[row[n]], noise=seen[number][1], expectation=covariance[row[n]])
+                candidate(
+                    n,
+                    seen[number].point_m,
+                    expected[row[n]],
+                    noise=seen[number].whole_covariance,
+                    expectation=covariance[row[n]],
+                )
                 for n in landmarks
             ]
             for number, landmarks in near.items()

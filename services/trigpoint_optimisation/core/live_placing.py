@@ -11,7 +11,7 @@ from trigpoint.errors import AlignmentRefused
 from trigpoint.geodesy.poses import transform_points, wrap_angle_rad
 from trigpoint_optimisation.core.alignment import rigid_alignment
 from trigpoint_optimisation.core.constellation import Constellation, constellation_match
-from trigpoint_optimisation.core.live_drive import Leg
+from trigpoint_optimisation.core.live_leg import Leg
 from trigpoint_optimisation.core.live_tracks import Track
 from trigpoint_optimisation.core.trajectory import composed
 

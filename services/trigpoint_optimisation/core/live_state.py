@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trigpoint.events.observed import VehicleDescribed
-from trigpoint_optimisation.core.live_drive import HungFix, Leg
+from trigpoint_optimisation.core.live_leg import HungFix, Leg
 from trigpoint_optimisation.core.live_placing import LandmarkPlacing, LocalFix
 from trigpoint_optimisation.core.live_tracks import Track
 
@@ -30,7 +30,8 @@ class DrivePlace:
 @dataclass(slots=True)
 class DriveInMap:
     """One drive's part in the map. `waiting`: legs that have no place yet; `unseen`: legs in the graph whose tracks are
-    to be looked at yet; `of`: the landmark of each track."""
+    to be looked at yet; `of`: the landmark of each track; `own`: the key of the pass's point of each track that has
+    one."""
 
     index: int
     described: VehicleDescribed
@@ -41,6 +42,7 @@ class DriveInMap:
     hung: dict[int, tuple[int, HungFix]] = field(default_factory=dict)
     pending: dict[int, Track] = field(default_factory=dict)
     of: dict[int, int] = field(default_factory=dict)
+    own: dict[int, int] = field(default_factory=dict)
     strikes: dict[int, int] = field(default_factory=dict)
     pending_since_m: dict[int, float] = field(default_factory=dict)
     placing: LandmarkPlacing = field(default_factory=LandmarkPlacing)

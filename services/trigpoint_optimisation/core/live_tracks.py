@@ -19,7 +19,8 @@ LEAST_SHARE = 0.1  # of a new detection in a track's mean: the frame they are li
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sweep:
     """What one sweep saw. point_odom_m (d, 2), the same in the frame of the keyframe it hangs on, point_m (d, 2) with
-    covariance (d, 2, 2); kind and signature (d,), and `row` (d,): which detections of the event these are."""
+    covariance (d, 2, 2), `told` by the sensor with each or not; kind and signature (d,), and `row` (d,): which
+    detections of the event these are."""
 
     stamp_ns: int
     sequence: int
@@ -28,6 +29,7 @@ class Sweep:
     point_odom_m: Floats
     point_m: Floats
     covariance: Floats
+    told: bool
     kind: tuple[str, ...]
     signature: tuple[str, ...]
 
@@ -35,19 +37,37 @@ class Sweep:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Seen:
     """One detection of a track: its keyframe, its sweep, the point (2,) in that keyframe's frame, its covariance
-    (2, 2)."""
+    (2, 2), `told` by the sensor or not."""
 
     keyframe: int
     sequence: int
     point_m: Floats
     covariance: Floats
+    told: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sight:
+    """Where a track was seen from one keyframe, the mean (2,) of its detections there: `covariance` (2, 2) of the error
+    that is this sight's own, and `shared_m2`, the variance per axis of the one that all sights of the track have in
+    common, 0 where the sensor tells no covariance."""
+
+    point_m: Floats
+    covariance: Floats
+    shared_m2: float
+
+    @property
+    def whole_covariance(self) -> Floats:
+        """Of both errors together (2, 2)."""
+        whole: Floats = self.covariance + self.shared_m2 * np.eye(2)
+        return whole
 
 
 @dataclass(slots=True)
 class Track:
-    """One thing that a pass sees: where in the drive's own frame (2,), and all its detections in order of keyframe, of
-    which the map has `used` the first. `first` is the sequence and row of the first detection; `apart` are tracks
-    that a sweep saw beside it."""
+    """One thing that a pass sees: where in the drive's own frame (2,), all its detections as they came, and those of
+    them that the map has not used yet. `first` is the sequence and row of the first detection; `apart` are tracks that
+    a sweep saw beside it."""
 
     number: int
     first: tuple[int, int]
@@ -59,7 +79,7 @@ class Track:
     last_keyframe: int = 0
     kinds: Counter[str] = field(default_factory=Counter)
     seen: list[Seen] = field(default_factory=list)
-    used: int = 0
+    unused: list[Seen] = field(default_factory=list)
     apart: set[int] = field(default_factory=set)
 
     @property
@@ -69,20 +89,32 @@ class Track:
 
     def take(self, sweep: Sweep, row: int) -> None:
         """One more detection."""
-        self.last_ns, self.last_keyframe = sweep.stamp_ns, sweep.keyframe
+        self.last_ns = max(self.last_ns, sweep.stamp_ns)
+        self.last_keyframe = max(self.last_keyframe, sweep.keyframe)
         self.kinds[sweep.kind[row]] += 1
-        self.seen.append(
-            Seen(
-                keyframe=sweep.keyframe,
-                sequence=sweep.sequence,
-                point_m=sweep.point_m[row],
-                covariance=sweep.covariance[row],
-            )
+        seen = Seen(
+            keyframe=sweep.keyframe,
+            sequence=sweep.sequence,
+            point_m=sweep.point_m[row],
+            covariance=sweep.covariance[row],
+            told=sweep.told,
         )
+        self.seen.append(seen)
+        self.unused.append(seen)
 
     def fresh(self, keyframe: int) -> list[Seen]:
         """The detections up to a keyframe that the map has not used yet."""
-        return [each for each in self.seen[self.used :] if each.keyframe <= keyframe]
+        return [each for each in self.unused if each.keyframe <= keyframe]
+
+    def use(self, keyframe: int) -> list[Seen]:
+        """The same, used from now on."""
+        fresh = self.fresh(keyframe)
+        self.unused = [each for each in self.unused if each.keyframe > keyframe]
+        return fresh
+
+    def begin_anew(self) -> None:
+        """As if the map had used none."""
+        self.unused = list(self.seen)
 
 
 class OpenTracks:
@@ -142,13 +174,16 @@ def usable(track: Track, first_keyframe: int, keyframe: int) -> list[Seen]:
     return [each for each in track.fresh(keyframe) if each.keyframe >= first_keyframe]
 
 
-def mean_seen(seen: Sequence[Seen]) -> tuple[Floats, Floats]:
-    """The mean (2,) of detections from one keyframe, with its covariance (2, 2)."""
+def sight_of(seen: Sequence[Seen], *, shared_share: float, offset_m: float) -> Sight:
+    """Detections of a track from one keyframe as one sight.
+
+    Where the sensor tells covariances their mean is no surer than one of them, and `shared_share` of its variance is
+    one error of the whole track, as in a whole solve (`sightings.drive_sightings`); `offset_m`, 1-sigma, by which all
+    a drive's things may seem too near, is part of that error. Else detections are independent.
+    """
     point_m: Floats = np.mean([each.point_m for each in seen], axis=0)
-    return point_m, np.sum([each.covariance for each in seen], axis=0) / len(seen) ** 2
-
-
-def seen_at(track: Track, keyframe: int) -> tuple[Floats, Floats] | None:
-    """Where a track was seen from a keyframe, with covariance, averaged; None where it was not, or is used already."""
-    seen = [each for each in track.fresh(keyframe) if each.keyframe == keyframe]
-    return mean_seen(seen) if seen else None
+    mean: Floats = np.mean([each.covariance for each in seen], axis=0)
+    if not any(each.told for each in seen):
+        return Sight(point_m=point_m, covariance=mean / len(seen), shared_m2=0.0)
+    shared_m2 = shared_share * 0.5 * float(np.trace(mean)) + offset_m**2
+    return Sight(point_m=point_m, covariance=(1.0 - shared_share) * mean, shared_m2=shared_m2)

@@ -1,13 +1,24 @@
 """What perception finds comes later than what was measured, and goes into the growing map as what a sensor detected."""
 
-from collections.abc import Iterator, Sequence
-from functools import cache
 from typing import cast
 
 import numpy as np
 
-from solved_worlds.examples import FRAME, Lap, World, world
-from solved_worlds.logged import all_accepted, append_world, drive_rows
+from solved_worlds.examples import FRAME
+from solved_worlds.logged import all_accepted, append_world
+from solved_worlds.perceived import by_perception
+from solved_worlds.perceived_lap import (
+    SETTINGS,
+    USUAL_NS,
+    drive,
+    is_sweep,
+    lap,
+    legs_of,
+    perceived,
+    rows,
+    seen_in,
+    sightings,
+)
 from trigpoint.events.codec import Event
 from trigpoint.events.envelope import Envelope, EventIdentity
 from trigpoint.events.mapped import LandmarkSolved
@@ -15,61 +26,9 @@ from trigpoint.events.observed import LandmarksDetected, Observed, VehicleDescri
 from trigpoint.events.perceived import LandmarksPerceived
 from trigpoint.logs.memory_log import MemoryLog
 from trigpoint.logs.perceived_readings import PERCEIVED_STREAM
-from trigpoint_optimisation.core.live_drive import PERCEIVED_WAIT_NS, Leg, LiveDrive
 from trigpoint_optimisation.core.live_fleet import LiveFleet
 from trigpoint_optimisation.live_perceived import PerceivedLandmarks
 from trigpoint_optimisation.resuming import resumed
-from trigpoint_optimisation.settings import SolveSettings
-from unit.optimisation.test_perceived_landmarks import by_perception
-
-USUAL_NS = 700_000_000  # five sweeps and the work
-SETTINGS = SolveSettings()
-
-
-@cache
-def lap() -> World:
-    return world(Lap(duration_s=40.0))
-
-
-@cache
-def rows() -> tuple[Envelope[Observed], ...]:
-    return tuple(cast(list[Envelope[Observed]], drive_rows(lap().drives[0])))
-
-
-def is_sweep(row: Envelope[Observed]) -> bool:
-    return isinstance(row.event, LandmarksDetected)
-
-
-def drive() -> LiveDrive:
-    return LiveDrive(lap().drives[0].described, "boot", SETTINGS, point_scale=1.0)
-
-
-def with_perceived(late_ns: int) -> Iterator[Envelope[Observed]]:
-    """Measurements in their order, each sweep so much later than what was measured with it."""
-    due = sorted((row.stamp_ns + late_ns * is_sweep(row), row.identity.sequence, row) for row in rows())
-    return (row for _, _, row in due)
-
-
-def legs_of(follower: LiveDrive, late_ns: int) -> list[Leg]:
-    """The legs of a drive in whose sweeps perception found so late what is in them."""
-    legs = []
-    for row in with_perceived(late_ns):
-        legs += follower.perceive(cast(Envelope[LandmarksDetected], row)) if is_sweep(row) else follower.take(row)
-    return legs
-
-
-def seen_in(legs: Sequence[Leg]) -> dict[int, list[tuple[int, int]]]:
-    """By keyframe the track and number of detections of all that was seen from it."""
-    return {
-        leg.keyframe: [
-            (track.number, sum(seen.keyframe == leg.keyframe for seen in track.seen)) for track in leg.tracks
-        ]
-        for leg in legs
-    }
-
-
-def sightings(seen: list[tuple[int, int]]) -> list[int]:
-    return sorted(count for _, count in seen)
 
 
 def test_a_leg_waits_for_what_is_perceived_in_its_sweeps() -> None:
@@ -83,23 +42,13 @@ def test_a_leg_waits_for_what_is_perceived_in_its_sweeps() -> None:
     assert [sightings(late[keyframe]) for keyframe in both] == [sightings(in_order[keyframe]) for keyframe in both]
 
 
-def test_what_comes_much_later_is_passed_over_and_the_drive_goes_on() -> None:
-    plain, follower = drive(), drive()
-    whole = [leg for row in rows() for leg in plain.take(row)]
-    legs = legs_of(follower, PERCEIVED_WAIT_NS + USUAL_NS)
-    assert len(legs) >= len(whole) - 12  # of the last seconds, which still wait
-    until_ns = rows()[-1].stamp_ns - PERCEIVED_WAIT_NS  # nothing newer makes what comes then late
-    assert not any(leg.tracks for leg in legs if leg.end_ns < until_ns)
-    assert follower.passed_over == sum(is_sweep(row) and row.stamp_ns < until_ns for row in rows())
-
-
 def test_what_is_ahead_of_all_measurements_is_kept_up_to_a_bound() -> None:
     follower = drive()
     follower.take(rows()[0])
-    sweep = cast(Envelope[LandmarksDetected], next(row for row in rows() if is_sweep(row)))
+    sweep = next(row for row in rows() if is_sweep(row))
     for number in range(1000):
         identity = EventIdentity("car", "boot", 10_000 + number)
-        follower.perceive(Envelope(identity, sweep.stamp_ns + 3_600_000_000_000 + number, sweep.event))
+        follower.perceive(Envelope(identity, sweep.stamp_ns + 3_600_000_000_000 + number, perceived(sweep).event))
     assert (follower.ahead, follower.passed_over) == (0, 500)
 
 
@@ -127,13 +76,13 @@ def fleet_log(*boots: str) -> MemoryLog:
 
 def grown(log: MemoryLog) -> list[LandmarkSolved]:
     """The landmarks of a map grown from a log, by measurements and what was perceived, some of each at a time."""
-    fleet, perceived = LiveFleet(FRAME, SETTINGS), PerceivedLandmarks(log, first_number=0)
+    fleet, follower = LiveFleet(FRAME, SETTINGS), PerceivedLandmarks(log, first_number=0)
     measured = [cast(Envelope[Observed], row.envelope) for row in log.read("veh-car")]
     for first in range(0, len(measured), 500):
-        perceived.take(fleet, measurements_wait=True)
+        follower.take(fleet, measurements_wait=True)
         for row in measured[first : first + 500]:
             fleet.take(row)
-            perceived.begun(fleet)
+            follower.begun(fleet)
         for verdict in all_accepted(measured[first : first + 500]):
             fleet.judged(verdict)
     while fleet.catch_up()[0]:

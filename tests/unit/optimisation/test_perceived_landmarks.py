@@ -7,11 +7,11 @@ import pytest
 
 from solved_worlds.examples import Lap, World, world
 from solved_worlds.logged import append_world
+from solved_worlds.perceived import VARIANCE_M2, by_perception
 from trigpoint.events.codec import Event
-from trigpoint.events.envelope import Envelope, EventIdentity
+from trigpoint.events.envelope import Envelope
 from trigpoint.events.mapped import LandmarkSolved
-from trigpoint.events.observed import LandmarkDetection, LandmarksDetected, VehicleDescribed
-from trigpoint.events.perceived import LandmarksPerceived, PerceivedLandmark
+from trigpoint.events.observed import LandmarksDetected, VehicleDescribed
 from trigpoint.landmarks.memory_store import MemoryStore
 from trigpoint.logs.memory_log import MemoryLog
 from trigpoint.logs.perceived_readings import PERCEIVED_STREAM
@@ -22,8 +22,7 @@ from trigpoint_optimisation.app import build, input_positions
 from trigpoint_optimisation.settings import OdometrySettings, SolveSettings
 
 SETTINGS = SolveSettings(method="anchored", odometry=OdometrySettings(keyframe_m=4.0))  # coarse: quick
-VARIANCE_M2 = 0.1**2  # of a sight, per axis, as perception tells it
-SIGHT_M = 0.1  # its sigma: sights weighed otherwise move a landmark by less
+SIGHT_M = math.sqrt(VARIANCE_M2)  # sights weighed otherwise move a landmark by less
 
 
 @pytest.fixture(scope="module")
@@ -54,36 +53,6 @@ def perceived(detected: MemoryLog) -> MemoryLog:
 
 def sweeps_of(rows: list[Envelope[Event]]) -> list[Envelope[Event]]:
     return [row for row in rows if isinstance(row.event, LandmarksDetected)]
-
-
-def by_perception(row: Envelope[Event], described: VehicleDescribed, sequence: int) -> Envelope[Event]:
-    assert isinstance(row.event, LandmarksDetected)
-    event = LandmarksPerceived(
-        vehicle=row.identity.source,
-        boot_id=row.identity.boot_id,
-        sensor="roof",
-        sweep_sequence=row.identity.sequence,
-        refusal="",
-        landmarks=tuple(in_base(seen, described) for seen in row.event.detections),
-    )
-    return Envelope(EventIdentity("perception", "boot-1", sequence), row.stamp_ns, event)
-
-
-def in_base(seen: LandmarkDetection, described: VehicleDescribed) -> PerceivedLandmark:
-    angle_rad = seen.bearing_rad + described.landmark_sensor_yaw_rad
-    return PerceivedLandmark(
-        kind=seen.kind,
-        landmark_class=seen.kind,
-        track=0,
-        x_m=described.landmark_sensor_x_m + seen.range_m * math.cos(angle_rad),
-        y_m=described.landmark_sensor_y_m + seen.range_m * math.sin(angle_rad),
-        variance_x_m2=VARIANCE_M2,
-        covariance_xy_m2=0.0,
-        variance_y_m2=VARIANCE_M2,
-        height_m=4.0,
-        diameter_m=seen.diameter_m,
-        points=20,
-    )
 
 
 @pytest.fixture(scope="module")
