@@ -8,6 +8,8 @@ VIEWER := services/trigpoint_landmarks/viewer
 VIEWER_PACKAGES := $(VIEWER)/node_modules/.package-lock.json
 VIEWER_BUILT := $(VIEWER)/dist/index.html
 WORKERS ?= 2
+# What a file's tests share is made once; the files come in their folders' order, the quickest ones, units, last.
+BY_FILE := --dist loadfile --no-loadscope-reorder
 PYTEST := $(BIN)/pytest $(if $(CI),--forbid-skipped=postgis --forbid-skipped=browser --forbid-skipped=qgis)
 
 .DEFAULT_GOAL := help
@@ -23,7 +25,7 @@ demo: $(INSTALLED) ## a simulated campus from raw logs to a georeferenced map, w
 viewer: $(VIEWER_BUILT) ## the page at /viewer/ of the HTTP service, built by npm
 
 test: $(DEVELOPED) system-tools viewer-where-possible ## all tests except the slow ones
-	$(PYTEST) --numprocesses $(WORKERS) --dist loadgroup -m "not slow"
+	$(PYTEST) --numprocesses $(WORKERS) $(BY_FILE) -m "not slow"
 
 test-all: $(DEVELOPED) system-tools viewer-where-possible ## all tests
 	$(PYTEST)

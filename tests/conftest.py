@@ -12,8 +12,6 @@ if TYPE_CHECKING:
 REPOSITORY = Path(__file__).resolve().parent.parent
 RECORDED_DRIVES = REPOSITORY.parent / "shared" / "data"
 
-COMPUTING = frozenset(("unit", "contract", "architecture"))  # folders
-
 pytest_plugins = ["pytester"]
 
 
@@ -44,10 +42,10 @@ def postgis() -> Iterator["Cluster"]:
 
 
 @pytest.fixture
-def postgis_url(postgis: "Cluster", monkeypatch: pytest.MonkeyPatch) -> str:
+def postgis_url(postgis: "Cluster") -> Iterator[str]:
     """The URL of an empty database of its own; the password is where PostgreSQL's clients look it up."""
-    monkeypatch.setenv("PGPASSFILE", str(postgis.password_table))
-    return postgis.url(postgis.created())
+    with postgis.password_known():
+        yield postgis.url(postgis.created())
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -58,15 +56,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         metavar="MARK",
         help="a skipped test with this mark, and any file skipped whole, counts as failed; may be given more than once",
     )
-
-
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """For several workers: files of tests that only compute go to whoever is free; all others, which start processes
-    and look at the clock, stay with one worker, in order."""
-    if config.pluginmanager.hasplugin("xdist"):
-        for item in items:
-            only_computes = not COMPUTING.isdisjoint(item.path.parts)
-            item.add_marker(pytest.mark.xdist_group(str(item.path) if only_computes else "processes"))
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

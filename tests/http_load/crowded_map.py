@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 
 import numpy as np
-import pytest
 
 from landmark_databases.cluster import Cluster, running_cluster
 from landmark_maps.examples import change, checkpoint, frame, solved_landmark
@@ -35,8 +34,7 @@ def crowded_cluster() -> Iterator[tuple[Cluster, str]]:
     points_m = np.random.default_rng(SEED).uniform(0.0, SIDE_M, (COUNT, 2)).tolist()
     solved = [solved_landmark(f"L{n}", x_m, y_m) for n, (x_m, y_m) in enumerate(points_m)]
     rows = landmark_rows(in_columns(solved), frame())
-    with running_cluster(durable=False) as cluster, pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PGPASSFILE", str(cluster.password_table))
+    with running_cluster(durable=False) as cluster, cluster.password_known():
         database = cluster.created()
         with closing(PostgisStore(cluster.url(database))) as store:
             store.defer_indexes()

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Literal
 
 import psycopg
+import pytest
 
 INSTALLED = Path("/usr/lib/postgresql")  # Debian's: one folder a major version
 EXTENSIONS = Path("/usr/share/postgresql")
@@ -86,8 +87,15 @@ class Cluster:
         """The name of a new, empty database with PostGIS in it."""
         name = f"map_{next(self.numbers)}"
         with self.connected("postgres") as connection:
-            connection.execute(f"CREATE DATABASE {name} TEMPLATE with_postgis")
+            connection.execute(f"CREATE DATABASE {name} TEMPLATE with_postgis STRATEGY FILE_COPY")  # 4 x as quick
         return name
+
+    @contextmanager
+    def password_known(self) -> Iterator[None]:
+        """PostgreSQL's clients of this process and its children find the password."""
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("PGPASSFILE", str(self.password_table))
+            yield
 
     @contextmanager
     def connected(self, database: str) -> Iterator["psycopg.Connection"]:

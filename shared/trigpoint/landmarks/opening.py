@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from trigpoint.errors import InputError
-from trigpoint.landmarks.geopackage_store import GeoPackageStore
 from trigpoint.landmarks.ports import LandmarkStore
 
 GEOPACKAGE, POSTGIS = "geopackage", "postgresql+psycopg"
@@ -31,6 +30,8 @@ def opened_store(url: str, *, password_file: Path | None = None, read_only: bool
     if path is not None:
         if path == Path():
             raise InputError(f"{url!r} names no file: {GEOPACKAGE}:<path> is needed")
+        from trigpoint.landmarks.geopackage_store import GeoPackageStore  # SQLAlchemy: nothing for a mere URL
+
         return GeoPackageStore(path, read_only=read_only)
     if scheme == POSTGIS:
         from trigpoint.landmarks.postgis_store import PostgisStore  # costs half a second, which a file does not need

@@ -73,8 +73,7 @@ class Stores:
 @pytest.fixture(scope="module")
 def stores(postgis: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stores]:
     path = tmp_path_factory.mktemp("features") / "map.gpkg"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PGPASSFILE", str(postgis.password_table))
+    with postgis.password_known():
         url = postgis.url(postgis.created())
         for store in (GeoPackageStore(path), PostgisStore(url)):
             with closing(store):

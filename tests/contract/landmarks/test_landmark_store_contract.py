@@ -1,9 +1,10 @@
-"""What every landmark store promises; each joins by a line in `stores`."""
+"""What every landmark store promises; each joins by a line in `KINDS` and one in `opened`."""
 
-from collections.abc import Iterator
-from contextlib import closing
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import pytest
@@ -19,21 +20,28 @@ from trigpoint.landmarks.ports import LandmarkStore
 from trigpoint.landmarks.postgis_store import PostgisStore
 from trigpoint.landmarks.queries import DegreeBox, Disc, LandmarkQuery, Nearest, PageMark, TimeSpan
 
+StoreT = TypeVar("StoreT", bound=LandmarkStore)
 EVERYWHERE = DegreeBox(lon_min_deg=-180.0, lat_min_deg=-90.0, lon_max_deg=180.0, lat_max_deg=90.0)
+KINDS = ["memory", "geopackage", pytest.param("postgis", marks=pytest.mark.postgis)]
 
 
-def opened(kind: str, request: pytest.FixtureRequest, folder: Path) -> LandmarkStore:
-    """A new store of a kind."""
-    if kind == "memory":
-        return MemoryStore()
-    if kind == "geopackage":
-        return GeoPackageStore(folder / "map.gpkg")
-    return PostgisStore(request.getfixturevalue("postgis_url"))
+@contextmanager
+def opened(request: pytest.FixtureRequest, folder: Path) -> Iterator[LandmarkStore]:
+    """A new store of the kind that the fixture is asked for."""
+    if request.param == "memory":
+        yield MemoryStore()
+    elif request.param == "geopackage":
+        with closing(GeoPackageStore(folder / "map.gpkg")) as store:
+            yield store
+    else:
+        cluster = request.getfixturevalue("postgis")
+        with cluster.password_known(), closing(PostgisStore(cluster.url(cluster.created()))) as store:
+            yield store
 
 
-@pytest.fixture(params=["memory", "geopackage", pytest.param("postgis", marks=pytest.mark.postgis)])
+@pytest.fixture(params=KINDS)
 def store(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[LandmarkStore]:
-    with closing(opened(request.param, request, tmp_path)) as store:
+    with opened(request, tmp_path) as store:
         yield store
 
 
@@ -333,17 +341,23 @@ def test_a_sound_store_has_no_damage(moved: LandmarkStore) -> None:
     assert moved.damage() == ()
 
 
-@pytest.fixture
-def crowd(store: LandmarkStore) -> tuple[LandmarkStore, MemoryStore]:
-    """300 landmarks at random on 2 km, a third of them moved in version 2; and the same in memory."""
+@pytest.fixture(scope="module", params=KINDS)
+def crowd(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[tuple[LandmarkStore, MemoryStore]]:
+    """300 landmarks at random on 2 km, a third of them moved in version 2; and the same in memory. To be read only."""
     at_m = np.random.default_rng(5).uniform(-1000.0, 1000.0, (400, 2)).tolist()
     rows = [landmark(f"L{n}", *at_m[n], kind=("pole", "corner")[n % 2]) for n in range(300)]
     again = [landmark(f"L{3 * n}", *at_m[300 + n]) for n in range(100)]
-    twin = MemoryStore()
-    for one in (store, twin):
-        one.apply(change(1, opened=rows), checkpoint(1))
-        one.apply(change(2, opened=again, closed=[row.landmark for row in again]), checkpoint(2))
-    return store, twin
+    with opened(request, tmp_path_factory.mktemp("crowd")) as store:
+        yield in_two_versions(store, rows, again), in_two_versions(MemoryStore(), rows, again)
+
+
+def in_two_versions(store: StoreT, rows: Sequence[Landmark], again: Sequence[Landmark]) -> StoreT:
+    """The store with the landmarks in its first version and some of them anew in its second."""
+    store.apply(change(1, opened=rows), checkpoint(1))
+    store.apply(change(2, opened=again, closed=[row.landmark for row in again]), checkpoint(2))
+    return store
 
 
 @pytest.mark.parametrize("as_of", [None, 1])
@@ -371,9 +385,8 @@ AROUND = Disc(lat_deg=HERE.lat_deg, lon_deg=HERE.lon_deg, radius_m=350.0)
 MORNING = TimeSpan(first_ns=START_NS + 100 * SECOND_NS, last_ns=START_NS + 200 * SECOND_NS)
 
 
-@pytest.fixture
-def varied(store: LandmarkStore) -> tuple[LandmarkStore, MemoryStore]:
-    """200 landmarks of different certainty, vehicles and times, a quarter of them moved in version 2; and in memory."""
+def varied_rows() -> tuple[list[Landmark], list[Landmark]]:
+    """200 landmarks of different certainty, vehicles and times, and a quarter of them moved."""
     numbers = np.random.default_rng(6)
     at_m = numbers.uniform(-1000.0, 1000.0, (250, 2)).tolist()
     rows = [
@@ -386,11 +399,16 @@ def varied(store: LandmarkStore) -> tuple[LandmarkStore, MemoryStore]:
         for n in range(200)
     ]
     again = [landmark(f"L{4 * n}", *at_m[200 + n])._replace(observation_count=99) for n in range(50)]
-    twin = MemoryStore()
-    for one in (store, twin):
-        one.apply(change(1, opened=rows), checkpoint(1))
-        one.apply(change(2, opened=again, closed=[row.landmark for row in again]), checkpoint(2))
-    return store, twin
+    return rows, again
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def varied(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[tuple[LandmarkStore, MemoryStore]]:
+    """The varied landmarks, moved in version 2; and the same in memory. To be read only."""
+    with opened(request, tmp_path_factory.mktemp("varied")) as store:
+        yield in_two_versions(store, *varied_rows()), in_two_versions(MemoryStore(), *varied_rows())
 
 
 CONDITIONS = {
@@ -472,9 +490,9 @@ def test_the_pages_of_an_answer_are_the_answer(varied: tuple[LandmarkStore, Memo
     assert {len(page.landmarks) for page in found[:-1]} <= {7}
 
 
-def test_pages_stay_in_the_version_of_the_first(varied: tuple[LandmarkStore, MemoryStore]) -> None:
-    store, query = varied[0], LandmarkQuery(limit=150)
-    first = page_of(store, query)
+def test_pages_stay_in_the_version_of_the_first(store: LandmarkStore) -> None:
+    query = LandmarkQuery(limit=150)
+    first = page_of(in_two_versions(store, *varied_rows()), query)
     store.apply(change(3, closed=[row.landmark for row in store.landmarks(LandmarkQuery())]), checkpoint(3))
     second = page_of(store, query, token=first.next_page)
     assert (first.map_version, second.map_version, len(second.landmarks)) == (2, 2, 50)

@@ -17,16 +17,22 @@ from trigpoint.logs.verification import verify
 EVENTS = 400
 
 
-@pytest.fixture
-def source(tmp_path: Path) -> Path:
-    """A log of two streams of two files of ten chunks of twenty events."""
-    written_log(tmp_path / "source", events=EVENTS)
-    return tmp_path / "source"
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Expected]:
+    """A log of two streams of two files of ten chunks of twenty events, and what it holds."""
+    folder = tmp_path_factory.mktemp("written") / "log"
+    return folder, written_log(folder, events=EVENTS)
 
 
 @pytest.fixture
-def expected(tmp_path: Path) -> Expected:
-    return written_log(tmp_path / "again", events=EVENTS)
+def source(written: tuple[Path, Expected], tmp_path: Path) -> Path:
+    """That log, to be damaged."""
+    return shutil.copytree(written[0], tmp_path / "source")
+
+
+@pytest.fixture
+def expected(written: tuple[Path, Expected]) -> Expected:
+    return written[1]
 
 
 @pytest.fixture
