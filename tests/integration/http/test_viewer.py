@@ -121,7 +121,8 @@ def test_an_image_s_shift_is_switched_on_and_read_tile_by_tile(page: Viewed) -> 
     page.page.get_by_role("checkbox", name="Shift of north").check()
     page.says("2 of 3 tiles tell; map version 3")
     wait_until(lambda: page.pixels() != before, "another picture")
-    page.tab("List")
+    with page.page.expect_response("**/collections/landmarks/items**"):  # what the list opens with
+        page.tab("List")
     page.page.get_by_label("Show", exact=True).select_option("shift")
     page.page.get_by_role("button", name="off by 0.78 m").press("Enter")
     details = page.page.get_by_role("region", name="Details")
