@@ -13,7 +13,7 @@ BY_FILE := --dist loadfile --no-loadscope-reorder
 PYTEST := $(BIN)/pytest $(if $(CI),--forbid-skipped=postgis --forbid-skipped=browser --forbid-skipped=qgis)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo viewer viewer-where-possible test test-all check format-check lint types contracts format figures schemas readme system-tools clean
+.PHONY: help demo viewer viewer-where-possible test test-all check format-check lint types contracts loops format figures schemas readme system-tools clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 14
@@ -43,6 +43,9 @@ types: $(DEVELOPED)
 
 contracts: $(DEVELOPED)
 	$(BIN)/lint-imports
+
+loops: $(DEVELOPED)
+	@PYTHONPATH=tests $(BIN)/python -m compiled_loops
 
 format: $(DEVELOPED) ## code and imports put in order
 	$(BIN)/ruff check --fix --select I
