@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-import laspy
 import numpy as np
 import pytest
 
+from las_files.writing import CHUNK_SIZE_AT, las, laszip_record_at, overwritten, truncated
 from trigpoint.errors import InputError
 from trigpoint.events.codec import decode
 from trigpoint.events.observed import GnssFixReceived, VehicleDescribed
@@ -106,17 +106,6 @@ def test_a_pcd_file_without_z_is_left_aside_with_its_reason(tmp_path: Path) -> N
     assert dict(written.left_aside.counts) == {"undecodable": 1}
 
 
-def las(path: Path, *, time_s: tuple[float, ...]) -> Path:
-    """Two points about 652,000 east and 6,862,000 north, with GPS times."""
-    header = laspy.LasHeader(point_format=1, version="1.4")
-    header.offsets, header.scales = np.array([652_000.0, 6_862_000.0, 0.0]), np.full(3, 0.001)
-    data = laspy.LasData(header)
-    data.x, data.y = np.array([652_001.5, 652_002.5]), np.array([6_862_003.0, 6_862_004.0])
-    data.z, data.intensity, data.gps_time = np.array([5.0, 6.0]), np.array([700, 800]), np.array(time_s)
-    data.write(path)
-    return path
-
-
 @pytest.mark.parametrize("suffix", ["las", "laz"])
 def test_a_las_files_points_are_taken_from_its_origin_with_their_times(tmp_path: Path, suffix: str) -> None:
     las(tmp_path / f"a.{suffix}", time_s=(1000.0, 1000.25))
@@ -127,16 +116,18 @@ def test_a_las_files_points_are_taken_from_its_origin_with_their_times(tmp_path:
     assert (sweep.intensity.tolist(), sweep.offset_ns.tolist()) == ([700.0, 800.0], [0, 250_000_000])
 
 
-def test_a_laz_file_that_asks_for_too_much_is_left_aside(tmp_path: Path) -> None:
-    content = bytearray(las(tmp_path / "a.laz", time_s=(1.0, 1.1)).read_bytes())
-    with laspy.open(tmp_path / "a.laz") as file:
-        begin = file.header.offset_to_point_data
-    table = int.from_bytes(content[begin : begin + 8], "little")
-    content[table + 4 : table + 8] = b"\xff" * 4  # the number of its chunks
-    (tmp_path / "a.laz").write_bytes(content)
-    (tmp_path / "stamps.csv").write_text("t,scan\n1,a.laz\n")
-    written, _ = converted(drive(tmp_path, 'file = "stamps.csv"\ntime = "t"'))
-    assert "a table of 4294967295 chunks for 2 points" in written.left_aside.complaints()[0]
+def test_damaged_laz_files_are_left_aside_by_name_and_the_good_ones_among_them_are_written(tmp_path: Path) -> None:
+    names = ["cut", "good", "flipped", "last"]
+    cut, _, flipped, _ = (las(tmp_path / f"{name}.laz") for name in names)
+    truncated(cut, lost=40)
+    overwritten(flipped, laszip_record_at(flipped) + CHUNK_SIZE_AT + 3, 0x80, size=1)  # a bit: 2**31 points a chunk
+    rows = "".join(f"{second},{name}.laz\n" for second, name in enumerate(names, start=1))
+    (tmp_path / "stamps.csv").write_text(f"t,scan\n{rows}")
+    written, events = converted(drive(tmp_path, 'file = "stamps.csv"\ntime = "t"\norigin_m = [652000, 6862000, 0]'))
+    sweeps = [event for _, event in events if isinstance(event, PointsScanned)]
+    assert [one.point_m[0].tolist() for one in sweeps] == [[1.5, 3.0, 5.0]] * 2
+    assert dict(written.left_aside.counts) == {"unreadable scan": 2}
+    assert "cut.laz: its table of chunks is at byte" in written.left_aside.complaints()[0]
 
 
 def test_a_las_file_that_takes_minutes_is_no_scan_of_its_points_times(tmp_path: Path) -> None:
