@@ -18,7 +18,7 @@ from trigpoint.events.scanned import PointsScanned
 from trigpoint_vehicle.cloud_conversion import LeftAside, writable
 from trigpoint_vehicle.core.kitti import bin_points
 from trigpoint_vehicle.core.mountings import Mounting
-from trigpoint_vehicle.core.pcd import pcd_points
+from trigpoint_vehicle.core.pcd import pcd_points, pcd_viewpoint
 from trigpoint_vehicle.core.recording import Recording, Timed, rows_with
 from trigpoint_vehicle.core.returns import returned_points
 from trigpoint_vehicle.core.scan_rows import LISTED_COLUMNS, ScanRow, ScanSource
@@ -72,15 +72,20 @@ def scanned(folder: Path, source: ScanSource, aside: LeftAside) -> Iterator[Time
         for row in tqdm(source.rows, desc="reading scans", unit="scan", disable=None):
             path = folder / row.path
             try:
-                yield row.stamp_ns, _sweep(_points(path, row, source, las), source)
+                points = _points(path, row, source, las)
+                yield row.stamp_ns, _sweep(points, _mounting(path, source), source)
             except EventRejected as error:
                 aside.add(error.reason, f"{path}: {error.detail}")
             except InputError as error:
                 aside.add("unreadable scan", str(error))
 
 
-def _sweep(points: PackedPoints, source: ScanSource) -> PointsScanned:
-    mounting: Mounting = source.mounting
+def _mounting(path: Path, source: ScanSource) -> Mounting:
+    """As the manifest says, else the file."""
+    return source.mounting or pcd_viewpoint(str(path), _content(path))
+
+
+def _sweep(points: PackedPoints, mounting: Mounting, source: ScanSource) -> PointsScanned:
     return PointsScanned(
         sensor=source.sensor,
         sensor_position_m=mounting.position_m,
@@ -96,17 +101,20 @@ def _points(path: Path, row: ScanRow, source: ScanSource, las: LasReader) -> Pac
     suffix = path.suffix.lower()
     if suffix in (".las", ".laz"):
         return _las_points(path, source, las)
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error}") from error
     if suffix == ".pcd":
-        packed = pcd_points(str(path), content)
+        packed = pcd_points(str(path), _content(path))
         return unpacked_points(packed.fields, packed.data, stride=packed.stride, stamp_ns=row.stamp_ns)
     if suffix == ".bin":
-        point_m, intensity = bin_points(str(path), content)
+        point_m, intensity = bin_points(str(path), _content(path))
         return _columns(point_m, intensity, np.zeros(len(intensity)))
     raise InputError(f"{path}: {suffix or 'a name without suffix'} is none of .pcd, .bin, .las, .laz")
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error}") from error
 
 
 def _las_points(path: Path, source: ScanSource, reader: LasReader) -> PackedPoints:

@@ -68,6 +68,47 @@ def test_the_lidar_stands_as_the_manifest_says(tmp_path: Path) -> None:
     assert sweep.sensor_orientation == pytest.approx([0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)])
 
 
+def pcd_drive(folder: Path, *viewpoints: str, mounted: str = "") -> Path:
+    """A drive whose scans are PCD files with these lines VIEWPOINT, its lidar mounted as said, if at all."""
+    header = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nVIEWPOINT {}\nDATA ascii\n1 2 3\n"
+    manifest = drive(folder, 'file = "seen/*.pcd"\ntime = { column = "stem", unit = "ns" }')
+    manifest.write_text(manifest.read_text().replace("position_m = [0.4, 0.0, 1.9]\nyaw_deg = 90.0\n", mounted))
+    (folder / "seen").mkdir()
+    for number, viewpoint in enumerate(viewpoints):
+        (folder / f"seen/{START_NS + number}.pcd").write_text(header.format(viewpoint))
+    return manifest
+
+
+def test_without_a_place_in_the_manifest_each_pcd_files_viewpoint_is_its_lidars(tmp_path: Path) -> None:
+    sweeps = sweeps_of(pcd_drive(tmp_path, "0.5 0 1.5 1 0 0 0", "0.5 0 1.6 0 0 0 1"))
+    assert [one.sensor_position_m.tolist() for one in sweeps] == [[0.5, 0.0, 1.5], [0.5, 0.0, 1.6]]
+    assert [one.sensor_orientation.tolist() for one in sweeps] == [[0, 0, 0, 1], [0, 0, 1, 0]]
+    assert sweeps[1].point_m.tolist() == [[1.0, 2.0, 3.0]]  # in the sensor's frame, as they stand
+
+
+def test_a_place_in_the_manifest_goes_before_the_files_viewpoints(tmp_path: Path) -> None:
+    (sweep,) = sweeps_of(pcd_drive(tmp_path, "0.5 0 1.5 nan 0 0 0", mounted="position_m = [0.4, 0.0, 1.9]\n"))
+    assert (sweep.sensor_position_m.tolist(), sweep.sensor_orientation.tolist()) == ([0.4, 0.0, 1.9], [0, 0, 0, 1])
+
+
+def test_a_pcd_file_whose_viewpoint_is_no_place_is_left_aside_and_the_next_is_written(tmp_path: Path) -> None:
+    written, rows = converted(pcd_drive(tmp_path, "0 0 1 2 0 0 0", "0.5 0 1.5 1 0 0 0"))
+    assert sum(isinstance(event, PointsScanned) for _, event in rows) == 1
+    assert "has a quaternion of length 2, limit 1 within 0.001" in written.left_aside.complaints()[0]
+
+
+def test_files_that_cannot_say_where_their_lidar_is_need_a_place_in_the_manifest(tmp_path: Path) -> None:
+    manifest = drive(tmp_path)
+    manifest.write_text(manifest.read_text().replace("position_m = [0.4, 0.0, 1.9]\nyaw_deg = 90.0\n", ""))
+    with pytest.raises(InputError, match=r"sensor 'roof' need position_m: scans/\d+.bin does not say"):
+        convert_table(manifest, tmp_path / "out")
+
+
+def test_a_lidar_that_is_turned_needs_a_place(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="yaw_deg without position_m"):
+        convert_table(pcd_drive(tmp_path, "0 0 1 1 0 0 0", mounted="yaw_deg = 90.0\n"), tmp_path / "out")
+
+
 def test_a_table_may_name_the_scans_and_their_times(tmp_path: Path) -> None:
     (tmp_path / "stamps.csv").write_text(f"when,cloud\n1700000000.5,scans/{START_NS}.bin\n")
     manifest = drive(tmp_path, 'file = "stamps.csv"\ntime = "when"\nscan = "cloud"')
