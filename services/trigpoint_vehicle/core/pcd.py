@@ -8,11 +8,14 @@ from numpy.typing import NDArray
 
 from trigpoint.errors import InputError
 from trigpoint.events.packed_points import PackedField
+from trigpoint_vehicle.core.mountings import AT_BASE, Mounting
 
 HEADER_LINES, HEADER_BYTES = 64, 16_384  # no header is longer
 NUMBER_KINDS = {"F": "f", "I": "i", "U": "u"}
 NUMBER_SIZES = {"F": (4, 8), "I": (1, 2, 4, 8), "U": (1, 2, 4, 8)}
 SCAN_LIMIT_BYTES = 256 * 1024 * 1024  # unpacked: what a header may make us allocate
+VIEWPOINT_NUMBERS = 7  # x, y, z in m, then a quaternion w, x, y, z
+UNIT_TOLERANCE = 1e-3  # of the quaternion's length: written with three decimals it is off by up to that
 LZF_LITERALS = 32  # a control byte below begins so many bytes and one more
 
 
@@ -47,6 +50,33 @@ def pcd_points(name: str, content: bytes) -> PcdPoints:
         raise InputError(f"{name}: DATA {kind!r} is none of ascii, binary, binary_compressed")
     fields = tuple(PackedField(field, offset, one) for field, (one, offset) in _scalars(layout))
     return PcdPoints(fields=fields, stride=layout.itemsize, data=data)
+
+
+def pcd_viewpoint(name: str, content: bytes) -> Mounting:
+    """Where the lidar stood, turned how, as the line VIEWPOINT of a file says: `T_a_sensor`, and the points are in the
+    sensor's frame (as PCL's pcl_transform_from_viewpoint takes it).
+
+    Raises InputError naming the file where the line is missing, is what writers put for a place they do not know (0 0 0
+    1 0 0 0), or holds what is no place or no unit quaternion.
+    """
+    header, _ = _header(name, content)
+    words = header.get("VIEWPOINT", [])
+    try:
+        numbers = np.array([float(word) for word in words])
+    except ValueError:
+        numbers = np.array([np.nan])
+    if len(numbers) != VIEWPOINT_NUMBERS or not np.isfinite(numbers).all():
+        raise InputError(f"{name}: VIEWPOINT {' '.join(words)!r} is not {VIEWPOINT_NUMBERS} finite numbers")
+    position_m, orientation = numbers[:3], np.roll(numbers[3:], -1)
+    length = float(np.linalg.norm(orientation))
+    if not abs(length - 1.0) <= UNIT_TOLERANCE:
+        said = f"VIEWPOINT {' '.join(words)!r} has a quaternion of length {length:.6g}"
+        raise InputError(f"{name}: {said}, limit 1 within {UNIT_TOLERANCE:g}")
+    if not position_m.any() and np.array_equal(np.abs(orientation), AT_BASE.orientation):
+        raise InputError(
+            f"{name}: VIEWPOINT {' '.join(words)!r} says nothing of where the lidar is, nor does the manifest"
+        )
+    return Mounting(position_m, orientation / length)
 
 
 def _header(name: str, content: bytes) -> tuple[dict[str, list[str]], int]:

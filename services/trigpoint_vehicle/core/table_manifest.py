@@ -216,19 +216,27 @@ class Sweeps(FilePart):
     `scans/*.pcd`, whose files are the rows and their names without suffix the column `stem`.
 
     The lidar stands at `position_m` in the base frame (z up from the ground), turned by roll about x, then pitch about
-    y, then yaw about z. `origin_m` is taken off the coordinates of LAS files. `point_times` "gps_time": these say of
-    each point when it was measured, and `time` is the first point's.
+    y, then yaw about z; without `position_m` PCD files say it, each by its line VIEWPOINT. `origin_m` is taken off the
+    coordinates of LAS files. `point_times` "gps_time": these say of each point when it was measured, and `time` is the
+    first point's.
     """
 
     time: AsTime
     scan: str = "scan"
     sensor: str = Field(default="lidar", max_length=SENSOR_LENGTH)
-    position_m: Triple
+    position_m: Triple | None = None
     roll_deg: float = 0.0
     pitch_deg: float = 0.0
     yaw_deg: float = 0.0
     origin_m: Triple = (0.0, 0.0, 0.0)
     point_times: Literal["none", "gps_time"] = "none"
+
+    @model_validator(mode="after")
+    def _is_turned_where_it_stands(self) -> Self:
+        turned = sorted(self.model_fields_set & {"roll_deg", "pitch_deg", "yaw_deg"})
+        if self.position_m is None and turned:
+            raise ValueError(f"{', '.join(turned)} without position_m")
+        return self
 
 
 class Heading(ManifestPart):

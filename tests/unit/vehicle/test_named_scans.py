@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-import laspy
 import numpy as np
 import pytest
 
+from las_files.writing import CHUNK_SIZE_AT, las, laszip_record_at, overwritten, truncated
 from trigpoint.errors import InputError
 from trigpoint.events.codec import decode
 from trigpoint.events.observed import GnssFixReceived, VehicleDescribed
@@ -68,6 +68,47 @@ def test_the_lidar_stands_as_the_manifest_says(tmp_path: Path) -> None:
     assert sweep.sensor_orientation == pytest.approx([0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)])
 
 
+def pcd_drive(folder: Path, *viewpoints: str, mounted: str = "") -> Path:
+    """A drive whose scans are PCD files with these lines VIEWPOINT, its lidar mounted as said, if at all."""
+    header = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nVIEWPOINT {}\nDATA ascii\n1 2 3\n"
+    manifest = drive(folder, 'file = "seen/*.pcd"\ntime = { column = "stem", unit = "ns" }')
+    manifest.write_text(manifest.read_text().replace("position_m = [0.4, 0.0, 1.9]\nyaw_deg = 90.0\n", mounted))
+    (folder / "seen").mkdir()
+    for number, viewpoint in enumerate(viewpoints):
+        (folder / f"seen/{START_NS + number}.pcd").write_text(header.format(viewpoint))
+    return manifest
+
+
+def test_without_a_place_in_the_manifest_each_pcd_files_viewpoint_is_its_lidars(tmp_path: Path) -> None:
+    sweeps = sweeps_of(pcd_drive(tmp_path, "0.5 0 1.5 1 0 0 0", "0.5 0 1.6 0 0 0 1"))
+    assert [one.sensor_position_m.tolist() for one in sweeps] == [[0.5, 0.0, 1.5], [0.5, 0.0, 1.6]]
+    assert [one.sensor_orientation.tolist() for one in sweeps] == [[0, 0, 0, 1], [0, 0, 1, 0]]
+    assert sweeps[1].point_m.tolist() == [[1.0, 2.0, 3.0]]  # in the sensor's frame, as they stand
+
+
+def test_a_place_in_the_manifest_goes_before_the_files_viewpoints(tmp_path: Path) -> None:
+    (sweep,) = sweeps_of(pcd_drive(tmp_path, "0.5 0 1.5 nan 0 0 0", mounted="position_m = [0.4, 0.0, 1.9]\n"))
+    assert (sweep.sensor_position_m.tolist(), sweep.sensor_orientation.tolist()) == ([0.4, 0.0, 1.9], [0, 0, 0, 1])
+
+
+def test_a_pcd_file_whose_viewpoint_is_no_place_is_left_aside_and_the_next_is_written(tmp_path: Path) -> None:
+    written, rows = converted(pcd_drive(tmp_path, "0 0 1 2 0 0 0", "0.5 0 1.5 1 0 0 0"))
+    assert sum(isinstance(event, PointsScanned) for _, event in rows) == 1
+    assert "has a quaternion of length 2, limit 1 within 0.001" in written.left_aside.complaints()[0]
+
+
+def test_files_that_cannot_say_where_their_lidar_is_need_a_place_in_the_manifest(tmp_path: Path) -> None:
+    manifest = drive(tmp_path)
+    manifest.write_text(manifest.read_text().replace("position_m = [0.4, 0.0, 1.9]\nyaw_deg = 90.0\n", ""))
+    with pytest.raises(InputError, match=r"sensor 'roof' need position_m: scans/\d+.bin does not say"):
+        convert_table(manifest, tmp_path / "out")
+
+
+def test_a_lidar_that_is_turned_needs_a_place(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="yaw_deg without position_m"):
+        convert_table(pcd_drive(tmp_path, "0 0 1 1 0 0 0", mounted="yaw_deg = 90.0\n"), tmp_path / "out")
+
+
 def test_a_table_may_name_the_scans_and_their_times(tmp_path: Path) -> None:
     (tmp_path / "stamps.csv").write_text(f"when,cloud\n1700000000.5,scans/{START_NS}.bin\n")
     manifest = drive(tmp_path, 'file = "stamps.csv"\ntime = "when"\nscan = "cloud"')
@@ -106,17 +147,6 @@ def test_a_pcd_file_without_z_is_left_aside_with_its_reason(tmp_path: Path) -> N
     assert dict(written.left_aside.counts) == {"undecodable": 1}
 
 
-def las(path: Path, *, time_s: tuple[float, ...]) -> Path:
-    """Two points about 652,000 east and 6,862,000 north, with GPS times."""
-    header = laspy.LasHeader(point_format=1, version="1.4")
-    header.offsets, header.scales = np.array([652_000.0, 6_862_000.0, 0.0]), np.full(3, 0.001)
-    data = laspy.LasData(header)
-    data.x, data.y = np.array([652_001.5, 652_002.5]), np.array([6_862_003.0, 6_862_004.0])
-    data.z, data.intensity, data.gps_time = np.array([5.0, 6.0]), np.array([700, 800]), np.array(time_s)
-    data.write(path)
-    return path
-
-
 @pytest.mark.parametrize("suffix", ["las", "laz"])
 def test_a_las_files_points_are_taken_from_its_origin_with_their_times(tmp_path: Path, suffix: str) -> None:
     las(tmp_path / f"a.{suffix}", time_s=(1000.0, 1000.25))
@@ -127,16 +157,18 @@ def test_a_las_files_points_are_taken_from_its_origin_with_their_times(tmp_path:
     assert (sweep.intensity.tolist(), sweep.offset_ns.tolist()) == ([700.0, 800.0], [0, 250_000_000])
 
 
-def test_a_laz_file_that_asks_for_too_much_is_left_aside(tmp_path: Path) -> None:
-    content = bytearray(las(tmp_path / "a.laz", time_s=(1.0, 1.1)).read_bytes())
-    with laspy.open(tmp_path / "a.laz") as file:
-        begin = file.header.offset_to_point_data
-    table = int.from_bytes(content[begin : begin + 8], "little")
-    content[table + 4 : table + 8] = b"\xff" * 4  # the number of its chunks
-    (tmp_path / "a.laz").write_bytes(content)
-    (tmp_path / "stamps.csv").write_text("t,scan\n1,a.laz\n")
-    written, _ = converted(drive(tmp_path, 'file = "stamps.csv"\ntime = "t"'))
-    assert "a table of 4294967295 chunks for 2 points" in written.left_aside.complaints()[0]
+def test_damaged_laz_files_are_left_aside_by_name_and_the_good_ones_among_them_are_written(tmp_path: Path) -> None:
+    names = ["cut", "good", "flipped", "last"]
+    cut, _, flipped, _ = (las(tmp_path / f"{name}.laz") for name in names)
+    truncated(cut, lost=40)
+    overwritten(flipped, laszip_record_at(flipped) + CHUNK_SIZE_AT + 3, 0x80, size=1)  # a bit: 2**31 points a chunk
+    rows = "".join(f"{second},{name}.laz\n" for second, name in enumerate(names, start=1))
+    (tmp_path / "stamps.csv").write_text(f"t,scan\n{rows}")
+    written, events = converted(drive(tmp_path, 'file = "stamps.csv"\ntime = "t"\norigin_m = [652000, 6862000, 0]'))
+    sweeps = [event for _, event in events if isinstance(event, PointsScanned)]
+    assert [one.point_m[0].tolist() for one in sweeps] == [[1.5, 3.0, 5.0]] * 2
+    assert dict(written.left_aside.counts) == {"unreadable scan": 2}
+    assert "cut.laz: its table of chunks is at byte" in written.left_aside.complaints()[0]
 
 
 def test_a_las_file_that_takes_minutes_is_no_scan_of_its_points_times(tmp_path: Path) -> None:

@@ -1,11 +1,13 @@
 """Points of PCD files, as PCL writes them: as text, as bytes, and packed."""
 
+import re
+
 import numpy as np
 import pytest
 
 from trigpoint.errors import InputError
 from trigpoint.events.packed_points import PackedPoints, unpacked_points
-from trigpoint_vehicle.core.pcd import lzf_unpacked, pcd_points
+from trigpoint_vehicle.core.pcd import lzf_unpacked, pcd_points, pcd_viewpoint
 
 HEADER = """# .PCD v0.7 - Point Cloud Data file format
 VERSION 0.7
@@ -116,3 +118,35 @@ def test_a_header_that_does_not_add_up_is_refused(wrong: str) -> None:
 def test_a_header_that_asks_for_too_much_is_refused_before_anything_is_made() -> None:
     header = HEADER.replace("POINTS 2", "POINTS 99999999999")
     assert "99999999999 points of 18 bytes, limit 268435456 bytes in all" in refused(f"{header}ascii\n".encode())
+
+
+def viewed_from(line: str) -> bytes:
+    """A file with another line VIEWPOINT."""
+    return f"{HEADER.replace('VIEWPOINT 0 0 0 1 0 0 0', line)}ascii\n".encode() + BODIES["ascii"]
+
+
+def test_the_viewpoint_is_where_the_lidar_stands_and_how_it_is_turned_w_first() -> None:
+    lidar = pcd_viewpoint("a.pcd", viewed_from("VIEWPOINT 1.2 -0.5 1.8 0.70711 0 0 0.70711"))
+    assert lidar.position_m.tolist() == [1.2, -0.5, 1.8]
+    assert lidar.orientation == pytest.approx([0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)], abs=1e-12)  # made unit: rounding
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        (
+            "VIEWPOINT 0 0 1 0.5 0 0 0.5",
+            "'0 0 1 0.5 0 0 0.5' has a quaternion of length 0.707107, limit 1 within 0.001",
+        ),
+        ("VIEWPOINT 0 0 1 0 0 0 0", "a quaternion of length 0, limit 1 within 0.001"),
+        ("VIEWPOINT 0 nan 1 1 0 0 0", "VIEWPOINT '0 nan 1 1 0 0 0' is not 7 finite numbers"),
+        ("VIEWPOINT 0 0 1 1 0 0 inf", "is not 7 finite numbers"),
+        ("VIEWPOINT 0 0 1", "VIEWPOINT '0 0 1' is not 7 finite numbers"),
+        ("VIEWPOINT here", "VIEWPOINT 'here' is not 7 finite numbers"),
+        ("", "VIEWPOINT '' is not 7 finite numbers"),
+        ("VIEWPOINT 0 0 0 1 0 0 0", "says nothing of where the lidar is, nor does the manifest"),
+    ],
+)
+def test_a_viewpoint_that_is_no_place_is_refused_with_what_it_says(line: str, why: str) -> None:
+    with pytest.raises(InputError, match=f"^a.pcd: .*{re.escape(why)}"):
+        pcd_viewpoint("a.pcd", viewed_from(line))

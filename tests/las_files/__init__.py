@@ -1,0 +1,1 @@
+"""LAS and LAZ files to test with, whole and damaged."""
