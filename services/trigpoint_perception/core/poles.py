@@ -73,7 +73,7 @@ def perceived_poles(
     )
     kept = circles.residual_m <= ROUND_SIGMAS * settings.range_sigma_m
     kept &= ~_are_people(circles, stood.top_m, sensor_m, _slope_top(ordered, sensor_m))
-    beside = _beside(_flanking(ordered), circles.centre_m, circles.radius_m, sensor_m[:2])
+    beside = _beside(_flanking(ordered.point_m, ordered.height_m), circles.centre_m, circles.radius_m, sensor_m[:2])
     kept &= beside <= FLANK_SHARE * stood.points
     return tuple(_poles(circles, stood, _classes(segments, circles, stood), np.nonzero(kept)[0]))
 
@@ -147,10 +147,16 @@ def _slope_top(ordered: OrderedSweep, sensor_m: Floats) -> float:
     return float(np.median((ordered.point_m[begin:, 2] - sensor_m[2]) / np.maximum(ordered.run_m[begin:], 0.1)))
 
 
-def _flanking(ordered: OrderedSweep) -> Floats:
-    """Points (n, 2) at the height of what may stand beside a pole."""
-    low_m, high_m = FLANK_HEIGHT_M
-    return ordered.point_m[(ordered.height_m >= low_m) & (ordered.height_m <= high_m), :2]
+@compiled
+def _flanking(point_m: Floats, height_m: Floats) -> Floats:
+    """Of points (n, 3) those (m, 2) at the height of what may stand beside a pole."""
+    flanking = np.empty((len(point_m), 2))
+    found = 0
+    for row in range(len(point_m)):
+        if FLANK_HEIGHT_M[0] <= height_m[row] <= FLANK_HEIGHT_M[1]:
+            flanking[found, 0], flanking[found, 1] = point_m[row, 0], point_m[row, 1]
+            found += 1
+    return flanking[:found]
 
 
 @compiled

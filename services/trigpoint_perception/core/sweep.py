@@ -12,6 +12,7 @@ from trigpoint_perception.settings import SweepSettings
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Measured = NDArray[np.float32]
 
 UNIT_TOLERANCE = 1e-3  # of a quaternion's length
 ELEVATION_STEP_RAD = 0.007  # 0.4 degrees: rings told by elevation where the sensor does not say
@@ -27,7 +28,7 @@ class Sweep:
     `azimuth_rad` and `run_m` (n,): each point's direction from the sensor when it was measured, in the base's axes, and
     its horizontal distance.
 
-    `sensor_m` (3,): the sensor in the base frame; `dropped`: points without a return, or out of range.
+    `sensor_m` (3,): the sensor in the base frame.
     """
 
     point_m: Floats
@@ -36,7 +37,6 @@ class Sweep:
     offset_ns: Ints
     ring: Ints
     sensor_m: Floats
-    dropped: int
 
 
 def rotation_of(quaternion: Floats) -> Floats:
@@ -61,8 +61,7 @@ def usable_sweep(scanned: PointsScanned, settings: SweepSettings) -> Sweep:
     rotation = _checked_rotation(scanned, settings)
     limits_m = np.array([settings.range_min_m, settings.range_max_m])
     sensor_m = np.array(scanned.sensor_position_m, dtype=np.float64)
-    taken = _taken(np.array(scanned.point_m, dtype=np.float64), rotation, sensor_m, limits_m)
-    row, own_m, base_m, azimuth_rad, run_m = taken
+    row, base_m, azimuth_rad, run_m = _taken(scanned.point_m, rotation, sensor_m, limits_m)
     if len(row) < settings.points_min:
         raise EventRejected(
             "no usable points",
@@ -74,28 +73,26 @@ def usable_sweep(scanned: PointsScanned, settings: SweepSettings) -> Sweep:
         azimuth_rad=azimuth_rad,
         run_m=run_m,
         offset_ns=scanned.offset_ns[row].astype(np.int64),
-        ring=_rings_by_elevation(own_m, scanned.ring[row]),
+        ring=_rings_by_elevation(scanned.point_m, row, scanned.ring[row].astype(np.int64)),
         sensor_m=sensor_m,
-        dropped=count - len(row),
     )
 
 
 @compiled
 def _taken(
-    point_m: Floats, rotation: Floats, sensor_m: Floats, limits_m: Floats
-) -> tuple[Ints, Floats, Floats, Floats, Floats]:
-    """The rows (m,) of points (n, 3) within range, themselves (m, 3) and in the base frame (m, 3), and their azimuths
-    and horizontal distances (m,) from the sensor in the base's axes."""
+    point_m: Measured, rotation: Floats, sensor_m: Floats, limits_m: Floats
+) -> tuple[Ints, Floats, Floats, Floats]:
+    """The rows (m,) of points (n, 3) within range, those points in the base frame (m, 3), and their azimuths and
+    horizontal distances (m,) from the sensor in the base's axes."""
     size = len(point_m)
-    row, own, base = np.empty(size, np.int64), np.empty((size, 3)), np.empty((size, 3))
+    row, base = np.empty(size, np.int64), np.empty((size, 3))
     azimuth, run = np.empty(size), np.empty(size)
     least, most = limits_m[0] ** 2, limits_m[1] ** 2
     kept = 0
     for number in range(size):
-        x, y, z = point_m[number, 0], point_m[number, 1], point_m[number, 2]
+        x, y, z = np.float64(point_m[number, 0]), np.float64(point_m[number, 1]), np.float64(point_m[number, 2])
         if least <= x * x + y * y + z * z <= most:  # NaN is not
             row[kept] = number
-            own[kept, 0], own[kept, 1], own[kept, 2] = x, y, z
             ahead = rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z
             left = rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z
             up = rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z
@@ -103,7 +100,7 @@ def _taken(
             azimuth[kept] = np.arctan2(np.float32(left), np.float32(ahead))  # to 1e-7 rad, in half the time
             run[kept] = np.sqrt(ahead * ahead + left * left)
             kept += 1
-    return row[:kept], own[:kept], base[:kept], azimuth[:kept], run[:kept]
+    return row[:kept], base[:kept], azimuth[:kept], run[:kept]
 
 
 def _check_count(count: int, settings: SweepSettings) -> None:
@@ -130,13 +127,13 @@ def _checked_rotation(scanned: PointsScanned, settings: SweepSettings) -> Floats
     return rotation_of(quaternion / length)
 
 
-def _rings_by_elevation(own_m: Floats, ring: NDArray[np.uint16]) -> Ints:
-    """Rings (n,) numbered from the lowest up, for points (n, 3) in the sensor's frame."""
-    number = ring.astype(np.int64)
-    if number.max() - number.min() + 1 < MIN_RINGS_BY_NUMBER:
-        number = np.floor(_elevations_rad(own_m) / ELEVATION_STEP_RAD).astype(np.int64)
+def _rings_by_elevation(point_m: Measured, row: Ints, ring: Ints) -> Ints:
+    """Rings (m,) numbered from the lowest up, for rows (m,) of points (n, 3) in the sensor's frame, as the sensor
+    numbers them."""
+    if ring.max() - ring.min() + 1 < MIN_RINGS_BY_NUMBER:
+        number = np.floor(_elevations_rad(point_m[row].astype(np.float64)) / ELEVATION_STEP_RAD).astype(np.int64)
         return number - int(number.min())
-    return _rank(_mean_rises(own_m, number, int(number.max()) + 1))[number]
+    return _rank(_mean_rises(point_m, row, ring, int(ring.max()) + 1))[ring]
 
 
 def _rank(value: Floats) -> Ints:
@@ -147,13 +144,13 @@ def _rank(value: Floats) -> Ints:
 
 
 @compiled
-def _mean_rises(own_m: Floats, ring: Ints, rings: int) -> Floats:
+def _mean_rises(point_m: Measured, row: Ints, ring: Ints, rings: int) -> Floats:
     """The mean rise per run (rings,) of each laser's points, infinite for one without points."""
     count, total = np.zeros(rings), np.zeros(rings)
-    for row in range(0, len(ring), SAMPLED_EVERY):
-        run_m = np.sqrt(own_m[row, 0] ** 2 + own_m[row, 1] ** 2)
-        count[ring[row]] += 1.0
-        total[ring[row]] += own_m[row, 2] / max(run_m, 1e-9)
+    for number in range(0, len(ring), SAMPLED_EVERY):
+        x, y, z = point_m[row[number]]
+        count[ring[number]] += 1.0
+        total[ring[number]] += z / max(np.sqrt(np.float64(x) ** 2 + np.float64(y) ** 2), 1e-9)
     mean = np.full(rings, np.inf)
     for number in range(rings):
         if count[number] > 0.0:

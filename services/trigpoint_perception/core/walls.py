@@ -46,8 +46,8 @@ def walls_of(ordered: OrderedSweep, sensor_m: Floats, settings: WallSettings) ->
     the chord (Douglas and Peucker 1973, as iterative end-point fit), fitted by least squares, and pieces on one line
     are merged, the longest first.
     """
-    rows = np.nonzero(_upright(ordered, sensor_m, settings))[0]
-    seen = np.column_stack([ordered.point_m[rows, :2], ordered.height_m[rows], ordered.ring[rows], ordered.run_m[rows]])
+    upright = _upright(ordered, sensor_m, settings)
+    seen = _chosen(upright, ordered.point_m, ordered.height_m, ordered.ring, ordered.run_m)
     length_min_m = PIECE_SHARE * settings.length_min_m
     limits = np.array([settings.gap_m, settings.split_m, settings.sigma_max_m, length_min_m, settings.points_min])
     sums, extent = _pieces(seen, ordered.step_rad, limits)
@@ -113,6 +113,19 @@ def _filled(cell: Ints, height_m: Floats, cells: int, top_min_m: float, extent_m
         if cell[row] >= 0:
             filled[row] = high[cell[row]] >= top_min_m and high[cell[row]] - low[cell[row]] >= extent_min_m
     return filled
+
+
+@compiled
+def _chosen(chosen: Bools, point_m: Floats, height_m: Floats, ring: Ints, run_m: Floats) -> Floats:
+    """Of the chosen of points (n,): x, y, height, ring, run (m, 5)."""
+    seen = np.empty((chosen.sum(), 5))
+    found = 0
+    for row in range(len(chosen)):
+        if chosen[row]:
+            seen[found, 0], seen[found, 1], seen[found, 2] = point_m[row, 0], point_m[row, 1], height_m[row]
+            seen[found, 3], seen[found, 4] = ring[row], run_m[row]
+            found += 1
+    return seen
 
 
 @compiled
