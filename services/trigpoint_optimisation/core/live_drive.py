@@ -37,6 +37,7 @@ from trigpoint_optimisation.core.trajectory import composed
 from trigpoint_optimisation.settings import CalibrationPriors, SolveSettings
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 Heard = GnssFixReceived | LandmarksDetected | LandmarksPerceived
 Event = Observed | LandmarksPerceived
 
@@ -247,15 +248,8 @@ class LiveDrive:
         )
 
     def _leg(self, drive: Drive) -> Leg:
-        source, odometry = turn_source(drive), self._settings.odometry
-        stamp_ns = drive.wheels.stamp_ns[[0, -1]]
-        motions = keyframe_motions(
-            drive,
-            nominal(int(stamp_ns[0])),
-            stamp_ns,
-            noise=odometry_noise(source, odometry),
-            max_gap_s=odometry.max_gap_s,
-        )
+        source, stamp_ns = turn_source(drive), drive.wheels.stamp_ns[[0, -1]]
+        motions = self._motions(drive, source, stamp_ns)
         motion = Motion(delta=motions.delta[0], derivative=motions.derivative[0], covariance=motions.covariance[0])
         tracks, fixes = self._hung(motions)
         dt_s = float(stamp_ns[1] - stamp_ns[0]) * 1e-9
@@ -278,6 +272,10 @@ class LiveDrive:
         )
         self._past.add(leg, motions.path)
         return leg
+
+    def _motions(self, drive: Drive, source: TurnSource, stamp_ns: Ints) -> Motions:
+        noise, max_gap_s = odometry_noise(source, self._settings.odometry), self._settings.odometry.max_gap_s
+        return keyframe_motions(drive, nominal(int(stamp_ns[0])), stamp_ns, noise=noise, max_gap_s=max_gap_s)
 
     def _calibrated(self, motion: Motion, tracks: list[Track], source: TurnSource, *, dt_s: float) -> Calibration:
         """What is known of the odometry after one more motion."""

@@ -35,9 +35,7 @@ class Instruments:
         self.throttled = self._counter("throttled", "Messages beyond a vehicle's rate, not taken.", "vehicle")
         self.sequence_gaps = self._counter("sequence_gaps", "Gaps seen in sequence numbers.", "vehicle")
         self.bus_lost = self._counter("bus_lost", "Messages dropped because a queue was full.")
-        self.late_sweeps = self._counter(
-            "late_sweeps", "Sweeps perceived after their leg was in the growing map.", "vehicle", "outcome"
-        )
+        self.late_sweeps = self._counter("late_sweeps", "Sweeps perceived after their leg.", "vehicle", "outcome")
         self.restarts = self._counter("restarts", "Times a supervised service was started anew.", "name")
         self.refused_access = self._counter("refused_access", "Sessions or messages refused by access control.")
         self.answers = self._counter("answers", "Questions answered.")
