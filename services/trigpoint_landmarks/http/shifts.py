@@ -46,7 +46,7 @@ class Shifts:
         """The file of an image that is listed: no other name reaches the disk."""
         names = self._names()
         if self.folder is None or image not in names:
-            raise Problem(HTTPStatus.NOT_FOUND, f"no shifts of image {image[:40]!r}: there are {len(names)} images'")
+            raise Problem(HTTPStatus.NOT_FOUND, f"no shifts of image {image[:40]!r}: there are {len(names)} images")
         path = self.folder / f"{image}{ENDING}"
         if path.stat().st_size > LAYER_MOST_BYTES:
             detail = f"the shifts of image {image[:40]} are more than {LAYER_MOST_BYTES} bytes"
