@@ -46,12 +46,13 @@ class PerceivedUpdateTimes:
 @dataclass(slots=True)
 class _Updates:
     """Each update's seconds, those of the processor, and whether sweeps came late since the one before; sweeps by
-    outcome."""
+    outcome; whether any came late since the last update."""
 
     wall_s: list[float] = field(default_factory=list)
     processor_s: list[float] = field(default_factory=list)
     late: list[bool] = field(default_factory=list)
     sweeps: Counter[str] = field(default_factory=Counter)
+    came_late: bool = False
 
     def of(self, fleet: LiveFleet, row: Envelope[Any], *, timed: bool) -> list[DrivePlace]:
         """One more event taken; where that brought its drive."""
@@ -59,14 +60,15 @@ class _Updates:
         is_perceived = isinstance(row.event, LandmarksPerceived)
         places = fleet.perceive(row) if is_perceived else fleet.take(row)
         took = time.perf_counter() - began_s, time.thread_time() - began_processor_s
-        late = fleet.take_late()
-        for (_, outcome), count in late.items():
+        for (_, outcome), count in fleet.take_late().items():
             self.sweeps[outcome] += count
+            self.came_late = True
         self.sweeps[ALL] += is_perceived
         if places and timed:
             self.wall_s.append(took[0])
             self.processor_s.append(took[1])
-            self.late.append(bool(late))
+            self.late.append(self.came_late)
+        self.came_late = self.came_late and not places
         return places
 
 
