@@ -171,7 +171,7 @@ def _created(connection: Connection) -> None:
         driver_of(connection).execute(statement)
     for reference in schema.required_references():
         insert_reference(connection, reference)
-    tables.metadata.create_all(connection)
+    tables.copied_metadata().create_all(connection)
     for view in tables.CURRENT_VIEWS.values():
         connection.execute(text(view))
     for feature_layer in schema.FEATURE_LAYERS:

@@ -225,6 +225,15 @@ CURRENT_VIEWS = {
 }
 
 
+def copied_metadata() -> MetaData:
+    """The tables as objects of their own, to create them by: GeoAlchemy2 takes columns off a table while it is created,
+    and threads share these."""
+    copied = MetaData()
+    for table in metadata.sorted_tables:
+        table.to_metadata(copied)
+    return copied
+
+
 def newest_version() -> Select[tuple[Any, ...]]:
     """The row of the newest version."""
     return select(map_versions).order_by(map_versions.c.map_version.desc()).limit(1)
